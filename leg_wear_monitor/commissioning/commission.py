@@ -35,7 +35,7 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted, largest_lag_s
-from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64
+from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, MAX_LAG_S
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -95,7 +95,7 @@ def findings(found: proposal.Found, load: Load | None, mechanism: Mechanism) -> 
 
 
 def _lag(found: proposal.Found) -> Iterator[str]:
-    timing, most = found.timing, found.base.drive_torque.max_lag_s
+    timing, most = found.timing, MAX_LAG_S
     if math.isfinite(timing.declared_s):
         return
     if not timing.is_lag_separated:
@@ -107,7 +107,7 @@ def _lag(found: proposal.Found) -> Iterator[str]:
     elif _KNOWN_SIGMAS * timing.error_s > most:
         error = 1.0e3 * _KNOWN_SIGMAS * timing.error_s
         yield (
-            f"lag: known to ± {error:.2g} ms only, more than drive_torque.max_lag_s ({1.0e3 * most:g} ms), "
+            f"lag: known to ± {error:.2g} ms only, more than the {1.0e3 * most:g} ms that are accepted, "
             "because clearances shift the torque's phase with the cadence; record cadences further apart"
         )
 
@@ -150,8 +150,8 @@ def _late(found: proposal.Found) -> str:
     if not abs(late) - _SURE * found.timing.error_s > most:
         return ""
     return (
-        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s and the declared lag "
-        f"of the drive ({1.0e3 * most:.3g} ms)"
+        f"the torque is late by {1.0e3 * late:.3g} ms, more than the accepted {1.0e3 * MAX_LAG_S:g} ms and "
+        f"the declared lag of the drive ({1.0e3 * most:.3g} ms)"
     )
 
 

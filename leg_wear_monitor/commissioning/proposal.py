@@ -215,7 +215,7 @@ _WAYS: Mapping[str, Callable[[Found], str]] = {
     "drive_torque.sampling": lambda found: "" if found.sampling.value else "ask the drive's manual",
     "lag": _lag,
     "load friction": lambda found: (
-        f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
+        f"declare drive.type: clearances change it by {found.fit.error.load_friction:.2g}"
     ),
 }
 

@@ -11,6 +11,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import LedgerFile, MonitorConfig
 from leg_wear_monitor.monitor.input_health import INPUT_RULES
@@ -122,7 +123,7 @@ def mismatch_item(walk: Walk) -> CommissioningItem | None:
     if len(found) < _LEAST_COMPARED:
         return None
     mean, scatter = float(found.mean()), float(found.std(ddof=1))
-    least = (mean + _SIGMAS * scatter) / walk.config.limits.warn_fraction
+    least = (mean + _SIGMAS * scatter) / WARN_FRACTION
     given = walk.config.limits.torque_mismatch
     return CommissioningItem(
         name=LIMIT,

@@ -1,4 +1,4 @@
-"""YAML files within bounds, strict conversion to classes, renamed keys, libraries of files."""
+"""YAML files within bounds, strict conversion to classes, libraries of files."""
 
 import math
 import reprlib
@@ -23,26 +23,6 @@ from leg_wear_monitor.configuration import FieldError
 from leg_wear_monitor.errors import ConfigError, did_you_mean, nearest
 from leg_wear_monitor.files import share_directory
 
-# Unknown keys of configurations, among them renamed ones (CHANGELOG.rst).
-
-
-RENAMED = {
-    "correct": "apply_corrections",
-    "knock_on_delay_cycles": "impact_on_delay_cycles",
-    "life": "growth_law_file",
-    "loose_joints": "clearance_joints",
-    "stops": "stop_recording_dir",
-    "warn_share": "warn_fraction",
-}
-
-
-def new_name(name: str) -> str | None:
-    """Present name of a renamed key, including its sections; None for a key that was not renamed."""
-    if name.startswith("input."):
-        return "table." + name.removeprefix("input.")
-    section, dot, key = name.rpartition(".")
-    return f"{section}{dot}{RENAMED[key]}" if key in RENAMED else None
-
 
 def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> str:
     """Error message for an unknown name.
@@ -53,13 +33,10 @@ def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> 
         Kind of the name, such as ``key`` or ``parameter``.
     name : str
     known : collection of str
-        Known names, to find a renamed or similar one.
+        Known names, to find a similar one.
     listed : str
         End of the message if there is no similar name: the place that lists the known names.
     """
-    renamed = new_name(name)
-    if renamed in known:
-        return f"is now called {renamed}"
     near = nearest(name, known)
     return f"unknown {what}, {f'did you mean {near}?' if near else listed}"
 

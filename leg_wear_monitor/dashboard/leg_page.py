@@ -77,18 +77,15 @@ class LegSetup:
     ----------
     monitor : ReplayMonitor
     shape : ReplayLeg
-    report_s : float
-        Time between two reports of the monitor on itself.
     """
 
     monitor: ReplayMonitor
     shape: ReplayLeg
-    report_s: float
 
 
 def leg_setup(config: MonitorConfig, mechanism: Mechanism) -> LegSetup:
     """The leg of a configuration, for a mechanism that `fitted` returned."""
-    return LegSetup(settings_of(config, mechanism), leg_shape(mechanism), config.diagnostics.period_s)
+    return LegSetup(settings_of(config, mechanism), leg_shape(mechanism))
 
 
 def unknown_leg() -> LegSetup:
@@ -104,7 +101,7 @@ def unknown_leg() -> LegSetup:
         limits=default.limits,
         duty_hours_per_day=default.forecast.duty_hours_per_day,
     )
-    return LegSetup(monitor, ReplayLeg(), default.diagnostics.period_s)
+    return LegSetup(monitor, ReplayLeg())
 
 
 def summary_of_now(

@@ -96,7 +96,6 @@ def _clean(part: Any) -> Any:
 
 _ROWS = 1200  # rows of the trends: twenty minutes at one report per second
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
-_REPORTS = 3.0  # or this many of its reports did not come
 _TRENDS_S = 5.0  # charts are many kilobytes, so the page does not send them with each message
 _GAIT = {"cycle": "cycles", "cadence_rpm": "cadence_rpm"}
 _TORQUE = {
@@ -212,20 +211,19 @@ class LiveLeg:
         """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
         with self._lock:
             arrived_s, leg_s = self._arrived_s, self._leg_silent_s
-        old_after_s = max(OLD_AFTER_S, _REPORTS * self._setup.report_s) if self._setup else OLD_AFTER_S
         if arrived_s is None:
             return Freshness(
                 None,
                 f"WAITING for the monitor {printable(self._node)}: no message yet on {self._waited_for}. "
                 "Is it running, with this name and this ROS_DOMAIN_ID?",
-                old_after_s,
+                OLD_AFTER_S,
             )
         age_s = self._clock() - arrived_s
         silence = "nothing is heard of the monitor; is it running?"
-        if leg_s is not None and age_s < old_after_s:
+        if leg_s is not None and age_s < OLD_AFTER_S:
             age_s += leg_s
             silence = "the monitor runs, but receives nothing from the leg; see its status below"
-        return Freshness(age_s, silence, old_after_s)
+        return Freshness(age_s, silence, OLD_AFTER_S)
 
     def _charts(self, now: ReplaySummary) -> str:
         now_s, (drawn_s, markup) = self._clock(), self._trends

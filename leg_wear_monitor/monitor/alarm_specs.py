@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.alarms import (
     SCALE,
     SIGN,
     STUCK,
+    WARN_FRACTION,
     ZERO,
     Alarm,
     Limit,
@@ -26,7 +27,7 @@ from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
 from leg_wear_monitor.twin import LOAD
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
     from leg_wear_monitor.monitor.input_health import InputHealth
     from leg_wear_monitor.monitor.inputs import InputGuard
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 _E = TypeVar("_E")
 
+DEADBAND = 0.05  # of a limit: a value at its limit must not switch the level in each gait cycle
+
 
 @attrs.frozen
 class LimitSource:
@@ -50,17 +53,11 @@ class LimitSource:
     bounds: "TorqueBounds"
     joint: int = 0
 
-    def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
+    @property
+    def clearance_m(self) -> float:
         """The joint's own limit if there are limits per joint, otherwise the common one."""
-        return own[self.joint] if own else of_all
-
-
-def _usual(alarms: "Alarms") -> int:
-    return alarms.on_delay_cycles
-
-
-def _knock(alarms: "Alarms") -> int:
-    return alarms.impact_on_delay_cycles
+        limits = self.config.limits
+        return limits.joint_clearance_m[self.joint] if limits.joint_clearance_m else limits.clearance_m
 
 
 @attrs.frozen(kw_only=True)
@@ -82,8 +79,8 @@ class AlarmSpec(Generic[_E]):
         cycle or of its foot load, which are given by kind, the value of this kind.
     limit : callable
         Limit of ERROR.
-    on_delay : callable
-        Gait cycles in a row for which a value must be beyond before the level rises.
+    is_immediate : bool
+        Whether the level rises in the first gait cycle beyond, without `alarms.on_delay_cycles`.
     is_least : bool
         Whether the limit is a lower bound: values below it are faults.
     is_count : bool
@@ -104,7 +101,7 @@ class AlarmSpec(Generic[_E]):
     limit_words: str
     value: Callable[[_E], float] = attrs.field()
     limit: Callable[[LimitSource], float]
-    on_delay: Callable[["Alarms"], int] = _usual
+    is_immediate: bool = False
     is_least: bool = False
     is_count: bool = False
     is_latched: bool = True
@@ -125,12 +122,12 @@ class AlarmSpec(Generic[_E]):
 
     def limits(self, source: LimitSource) -> Limit:
         """Limits of its levels."""
-        error, alarms, warn = self.limit(source), source.config.alarms, source.config.limits.warn_fraction
+        error = self.limit(source)
         if self.is_count:
             return Limit(error, error)
-        first = error / warn if self.is_least else warn * error
-        delay = self.on_delay(alarms)
-        return Limit(first, error, alarms.deadband, delay, self.is_least, self.is_latched, self.far)
+        first = error / WARN_FRACTION if self.is_least else WARN_FRACTION * error
+        delay = 1 if self.is_immediate else source.config.alarms.on_delay_cycles
+        return Limit(first, error, DEADBAND, delay, self.is_least, self.is_latched, self.far)
 
 
 def _parameter(name: str) -> dict[str, Any]:
@@ -138,16 +135,21 @@ def _parameter(name: str) -> dict[str, Any]:
     return {"limit_words": f"`limits.{name}`", "limit": lambda of: getattr(of.config.limits, name)}
 
 
+def _constant(limit: float, words: str = "") -> dict[str, Any]:
+    """Limit of an alarm that is the same for all legs."""
+    return {"limit_words": words or f"{limit:g}", "limit": lambda _: limit}
+
+
 IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="impact_force",
     unit="N",
     quantity="peak contact force",
     meaning="peak contact force of the gait cycle, N",
-    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`; from 1.1 times the commanded "
-    "cadence on, times the square of the ratio",
+    limit_words="`limits.impact_force_n`; from 1.1 times the commanded cadence on, times the square of the "
+    "ratio",
     value=lambda joint: joint.peak_force_n,
-    limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
-    on_delay=_knock,
+    limit=lambda of: of.config.limits.impact_force_n,
+    is_immediate=True,  # the next impact may break the joint
     figure=Figure.IMPACT_FORCES,
 )
 CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -157,7 +159,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     meaning="mean radial clearance, modelled or, if larger, measured, m",
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
     value=lambda joint: joint.judged_clearance_m,
-    limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
+    limit=lambda of: of.clearance_m,
     figure=Figure.CLEARANCES,
 )
 GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -184,9 +186,8 @@ MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
     quantity="load over the limits of the material",
     meaning="largest of pressure (99th percentile), sliding speed and p v (means) of the gait cycle, as a "
     "fraction of the limits of the joint's material. Only with a material that has limits",
-    limit_words="1, the limits of the material",
+    **_constant(1.0, "1, the limits of the material"),
     value=lambda joint: or_nan(joint.load.fraction if joint.load else None),
-    limit=lambda _: 1.0,
 )
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
@@ -194,7 +195,7 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     quantity="difference between the clearance from encoders and the modelled clearance",
     meaning="difference between the clearance from further encoders and the modelled clearance, m; 0 below "
     "four standard deviations. Only with `encoders.names`",
-    **_parameter("clearance_departure_m"),
+    **_constant(1.0e-4, "0.1 mm"),  # a third of a new clearance
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
 )
 MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
@@ -220,9 +221,8 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     kind="input_sources",
     quantity="number of sources of the crank angle",
     meaning="number of sources of the crank angle",
-    limit_words="2, at once",
+    **_constant(2.0, "2, at once"),
     value=lambda guard: float(guard.sources),
-    limit=lambda _: 2.0,
     is_count=True,
 )
 
@@ -234,9 +234,9 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         kind=BIAS,
         unit="N m",
         quantity="constant drive torque beyond the bounds of friction",
-        meaning="constant drive torque that friction cannot cause, N m: it drives, or exceeds "
-        "`drive_torque.max_friction_nm`",
-        limit_words="`limits.torque_bias_nm`",
+        meaning="constant drive torque that friction cannot cause, N m: it drives, or exceeds 0.3 of the "
+        "predicted RMS",
+        limit_words="0.1 of the predicted RMS",
         limit=lambda of: of.bounds.bias_nm,
     ),
     AlarmSpec(
@@ -244,7 +244,7 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         unit="N m",
         quantity="change of the constant drive torque since commissioning",
         meaning="change of the constant drive torque since this leg was commissioned, N m",
-        limit_words="`limits.torque_drift_nm`",
+        limit_words="0.15 of the predicted RMS",
         limit=lambda of: of.bounds.drift_nm,
     ),
     AlarmSpec(
@@ -252,7 +252,7 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         unit="s",
         quantity="delay of the measured torque",
         meaning="delay of the measured torque, late or early, s",
-        limit_words="`drive_torque.max_lag_s`",
+        limit_words="5 ms, and the declared lag and low-pass of the drive",
         limit=lambda of: of.bounds.max_lag_s,
     ),
 )
@@ -267,7 +267,7 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
         unit="Hz",
         quantity=f"rate of usable {name} samples",
         meaning=f"rate of usable {name} samples, Hz",
-        **_parameter("min_rate_hz"),
+        **_constant(40.0, "40 Hz"),  # five samples in a period of the tracker's bandwidth, 8 Hz
         value=lambda health: health.rate_hz[name],
         is_least=True,
         is_latched=False,
@@ -281,8 +281,7 @@ def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any
         subject=subject,
         quantity=quantity,
         meaning=f"{meaning}. Only with `foot_load.source`",
-        limit_words=f"{FOOT_LOAD_LIMITS[kind]:g}",
-        limit=lambda _: FOOT_LOAD_LIMITS[kind],
+        **_constant(FOOT_LOAD_LIMITS[kind]),
         is_latched=not subject,
     )
 
@@ -330,22 +329,22 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         kind="input_samples",
         quantity="fraction of unusable samples",
         meaning="fraction of unusable samples: faulty, repeated, late, wrong stamp, outlier",
-        **_parameter("bad_sample_fraction"),
+        **_constant(0.05),
         value=lambda health: health.bad_fraction,
     ),
     AlarmSpec(
         kind="input_gaps",
         quantity="fraction of unmonitored time",
         meaning="fraction of unmonitored time",
-        **_parameter("lost_time_fraction"),
+        **_constant(0.05),
         value=lambda health: health.lost_fraction,
         is_latched=False,
     ),
     AlarmSpec(
         kind="input_torque",
         quantity="fraction of stuck or saturated torque samples",
-        meaning="fraction of torque samples that are saturated, or repeat the largest or the smallest",
-        **_parameter("stuck_torque_fraction"),
+        meaning="fraction of torque samples that repeat the largest or the smallest",
+        **_constant(0.3),  # a torque that is not clipped repeats its extremes in a few samples only
         value=lambda health: health.stuck_torque_fraction,
     ),
 )

@@ -21,6 +21,9 @@ from leg_wear_monitor.state import Level
 # the on-delay counts gait cycles.
 
 
+WARN_FRACTION = 0.8  # WARN begins at this fraction of a limit: time to order a part
+
+
 @attrs.frozen
 class Limit:
     """Limits of the levels of an alarm.

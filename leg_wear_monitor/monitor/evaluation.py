@@ -57,7 +57,7 @@ def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
-    bounds = torque_bounds(config, torque_size_nm, largest_lag_s(config))
+    bounds = torque_bounds(torque_size_nm, largest_lag_s(config))
     return {
         alarm.name: spec.limits(LimitSource(config, bounds, k))
         for spec, k, alarm in specs_of(config, clearance_joints)
@@ -332,8 +332,7 @@ class AlarmEvaluation:
 
     def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
-        saturation_nm = self.config.drive_torque.saturation_nm
-        self._torque = with_torques(self._torque, piece, saturation_nm)
+        self._torque = with_torques(self._torque, piece)
         self._not_finite = with_not_finite(self._not_finite, piece)
 
     @property

@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
-from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
+from leg_wear_monitor.twin.sample import BRIDGE_LIMIT_S, FAULTS, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics, NotCompared
 
 # Evidence that the tracked motion is a gait of this leg; without one such cycle, forces are meaningless.
@@ -115,7 +115,7 @@ class GaitEvidence:
             stamps, angles = np.append(self._last[0], stamps), np.append(self._last[1], angles)
         self._last = int(stamps[-1]), float(angles[-1])
         steps = np.diff(stamps.astype(float)) / 1e9
-        ahead = (steps > 0.0) & (steps <= self.config.tracker.gap_limit_s)
+        ahead = (steps > 0.0) & (steps <= BRIDGE_LIMIT_S)
         with np.errstate(over="ignore", invalid="ignore"):  # an angle may be any finite number
             turned = (np.diff(angles)[ahead] + math.pi) % TURN - math.pi
         self._turned_rad += abs(float(np.nansum(turned)))
@@ -141,7 +141,7 @@ class GaitEvidence:
 
     def _why_none(self) -> str:
         """Reason why valid samples form no gait cycle."""
-        gap, commanded = self.config.tracker.gap_limit_s, self.config.cadence.commanded_rpm
+        gap, commanded = BRIDGE_LIMIT_S, self.config.cadence.commanded_rpm
         if not self._passed_s:
             return f"no two of {self._sound} crank samples follow each other within {gap:g} s"
         turns, rate = self._turned_rad / TURN, self._sound / self._passed_s
@@ -290,14 +290,9 @@ class TorqueBounds:
     drift_nm: float
 
 
-def torque_bounds(config: MonitorConfig, size_nm: float, max_lag_s: float) -> TorqueBounds:
-    """Bounds from the parameters; missing ones follow from the RMS of the predicted torque [N m]."""
-    return TorqueBounds(
-        max_friction_nm=config.drive_torque.max_friction_nm or _FRICTION * size_nm,
-        max_lag_s=max_lag_s,
-        bias_nm=config.limits.torque_bias_nm or _BIAS * size_nm,
-        drift_nm=config.limits.torque_drift_nm or _DRIFT * size_nm,
-    )
+def torque_bounds(size_nm: float, max_lag_s: float) -> TorqueBounds:
+    """Bounds from the RMS of the predicted torque [N m], and the largest lag."""
+    return TorqueBounds(_FRICTION * size_nm, max_lag_s, _BIAS * size_nm, _DRIFT * size_nm)
 
 
 def torque_values(report: CycleReport, record: TorqueRecord, bounds: TorqueBounds) -> dict[str, float]:

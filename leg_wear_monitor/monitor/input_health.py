@@ -39,32 +39,29 @@ class TorqueRange:
     largest_nm: float = -math.inf
     at_least: int = 0
     at_largest: int = 0
-    saturated: int = 0
 
     @property
     def stuck_fraction(self) -> float:
-        """Fraction of the torques that are saturated, or repeat an extreme; NaN while there are few."""
+        """Fraction of the torques that repeat an extreme; NaN while there are few."""
         if self.number < _LEAST_TORQUES:
             return math.nan
-        repeated = max(count for count in (self.at_least, self.at_largest, 1))
-        return max(repeated if repeated > 1 else 0, self.saturated) / self.number
+        repeated = max(self.at_least, self.at_largest)
+        return repeated / self.number if repeated > 1 else 0.0
 
 
-def with_torques(before: TorqueRange, samples: Samples, saturation_nm: float) -> TorqueRange:
+def with_torques(before: TorqueRange, samples: Samples) -> TorqueRange:
     """Range extended by the torques of more samples, including efforts in crank samples."""
     found = samples["torque_nm"][samples["fault"] == NO_FAULT]
     found = found[np.isfinite(found)]
     if not len(found):
         return before
     least, largest = min(before.least_nm, float(found.min())), max(before.largest_nm, float(found.max()))
-    beyond = np.count_nonzero(np.abs(found) >= saturation_nm) if saturation_nm > 0.0 else 0
     return TorqueRange(
         before.number + len(found),
         least,
         largest,
         int(np.count_nonzero(found == least)) + (before.at_least if least == before.least_nm else 0),
         int(np.count_nonzero(found == largest)) + (before.at_largest if largest == before.largest_nm else 0),
-        before.saturated + int(beyond),
     )
 
 
@@ -84,7 +81,7 @@ class InputHealth:
     lost_fraction : float
         Fraction of the time in which the leg was not tracked.
     stuck_torque_fraction : float
-        Fraction of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
+        Fraction of the torque samples that repeat the largest or the smallest one; 1 if all
         are equal. Unknown where the leg stood in this time: a torque at rest does not change.
     """
 
@@ -156,7 +153,7 @@ _SENTENCES = {
     "wrong_type": "are of a type that is not read",
     "out_of_range": "have an impossible value or a torque far from the others (units are rad and N m)",
     "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
-    "late": "arrive more than tracker.reorder_window_s after newer ones",
+    "late": "arrive more than 20 ms after newer ones",
     "stray_stamps": "have a stamp far from the others: see the clock of the sender",
     "outliers": "have an angle far from the motion of the others",
     "load_outliers": "have a foot load far from the samples before and after: see the cable of the sensor",
@@ -409,9 +406,7 @@ def _saturated(one: Stretch) -> Words | None:
         for end, beside in ((number[0], number[1]), (number[-1], number[-2]))
         if end >= _BESIDE * beside
     ]
-    known = one.config.drive_torque.saturation_nm
-    beyond = np.count_nonzero(np.abs(one.torque) >= known) if known > 0.0 else 0
-    part = max(sum(ends), beyond) / len(one.torque)
+    part = sum(ends) / len(one.torque)
     if part < _AT_END:
         return None
     return {"size": amount(most, "N m"), "percent": f"{100.0 * part:.0f}"}

@@ -131,7 +131,6 @@ def measure(
     found = attrs.evolve(
         found,
         limit_m=leg.evaluation.board.clearance_limits_m[leg.clearance_joints.index(joint)],
-        warn_fraction=leg.config.limits.warn_fraction,
         earlier=earlier,
     )
     if best:

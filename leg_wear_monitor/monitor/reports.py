@@ -275,6 +275,10 @@ class Reports:
     states: tuple[VerdictReport, ...] = ()
 
 
+DIAGNOSTICS_PERIOD_S = 1.0
+"""Time between two lists of statuses: tools for /diagnostics expect one per second."""
+
+
 @attrs.frozen
 class Status:
     """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.

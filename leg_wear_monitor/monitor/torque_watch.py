@@ -13,6 +13,7 @@ from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
 from leg_wear_monitor.estimate.mismatch import Allowed, explanation
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH, TORQUE
+from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.counted_leg import CountedLeg
@@ -345,7 +346,7 @@ class TorqueWatch(Observer):
     @property
     def _bounds(self) -> TorqueBounds:
         config = self._leg.config
-        return torque_bounds(config, self._leg.twin.torque_size_nm, largest_lag_s(config))
+        return torque_bounds(self._leg.twin.torque_size_nm, largest_lag_s(config))
 
     @property
     def _allowed(self) -> Allowed:
@@ -355,7 +356,7 @@ class TorqueWatch(Observer):
             lag_s=bounds.max_lag_s,
             loads_n=self._leg.twin.settings.loads_n,
             friction_nm=bounds.max_friction_nm,
-            unexplained=limits.warn_fraction * limits.torque_mismatch,
+            unexplained=WARN_FRACTION * limits.torque_mismatch,
         )
 
     @property

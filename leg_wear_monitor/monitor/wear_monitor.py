@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
-from leg_wear_monitor.monitor.forecast.growth import all_extended
+from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, all_extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts
 from leg_wear_monitor.monitor.judgement import (
@@ -218,7 +218,7 @@ class WearMonitor:
         if refused:
             statistics = statistics.without_torque
         self._accounting.ended(statistics)
-        leg.growth = all_extended(leg.growth, statistics, self.config.growth.window_cycles)
+        leg.growth = all_extended(leg.growth, statistics, GROWTH_CYCLES)
         for observer in leg.observers:
             observer.end_cycle(statistics, bool(refused))
         leg.last = report = self._report(statistics)

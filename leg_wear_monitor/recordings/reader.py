@@ -24,7 +24,15 @@ from leg_wear_monitor.recordings.names import (
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.recordings.wrench_axis import WrenchAxis
 from leg_wear_monitor.twin import TORQUE
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
+from leg_wear_monitor.twin.sample import (
+    BRIDGE_LIMIT_S,
+    GAIT_SAMPLE,
+    MISSING_JOINT,
+    NO_FAULT,
+    NOT_FINITE,
+    ZERO_STAMP,
+    Samples,
+)
 
 # Check that several files record one leg: the same topics, and the crank joint in their messages.
 
@@ -332,7 +340,7 @@ class Recording:
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
         numbers = [source.bag_file.recording for source in self._sources]
-        self._pauses = Pauses(self.files, numbers, round(config.tracker.gap_limit_s * 1.0e9))
+        self._pauses = Pauses(self.files, numbers, round(BRIDGE_LIMIT_S * 1.0e9))
 
     def __enter__(self) -> "Recording":
         return self

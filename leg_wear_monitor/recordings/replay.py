@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.config.parameters import NODE, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.file import copy_of
+from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
 from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
@@ -240,5 +241,5 @@ def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
 
 def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples]:
     """Split the samples of a block at the times when diagnostics are due."""
-    period_ns = round(config.diagnostics.period_s * 1e9)
+    period_ns = round(DIAGNOSTICS_PERIOD_S * 1e9)
     yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)

@@ -323,8 +323,8 @@ def check_stamps(config: MonitorConfig, source: str) -> None:
     """Refuse inputs without stamps, for a node with ``use_sim_time``.
 
     Wall time of arrival does not match the time of the other inputs, and ``/clock`` comes 10 to 100 times a
-    second. A torque stamped by it would be late by more than ``drive_torque.max_lag_s``, and a healthy leg
-    would look like a different leg.
+    second. A torque stamped by it would be late by more than 5 ms, and a healthy leg would look like a
+    different leg.
 
     Raises
     ------

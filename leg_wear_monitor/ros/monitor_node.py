@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operators import alarm_words, wear_words
-from leg_wear_monitor.monitor.reports import Reports, Status
+from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.cdr import Decoder
@@ -260,7 +260,7 @@ class MonitorNode(ClosingNode):
         # work and diagnostics continue while simulation time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_TAKE_S, partial(self._take, inputs), clock=steady)
-        self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
+        self.create_timer(DIAGNOSTICS_PERIOD_S, self._diagnose, clock=steady)
         self.create_timer(_RELEASE_S, release_memory, clock=steady)
         self._in_order.enter_context(repeated(lambda _: self._receive(inputs), _RECEIVE_S))
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name

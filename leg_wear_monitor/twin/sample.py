@@ -149,6 +149,10 @@ STANCE, CONSTANT = "stance", "constant"
 LOAD_SHAPES = STANCE, GROUND, CONSTANT
 
 
+BRIDGE_LIMIT_S = 0.5
+"""Longest gap that the tracker bridges at the tracked speed: half a gait cycle at 60 rpm."""
+
+
 @attrs.frozen(kw_only=True)
 class TrackerSettings:
     """Settings of the crank tracker.
@@ -202,7 +206,7 @@ class TrackerSettings:
     reorder_window_s: float = 0.02
     lag_s: float = 0.0
     knot_interval_s: float = 0.0
-    bridge_limit_s: float = 0.5
+    bridge_limit_s: float = BRIDGE_LIMIT_S
     mark_gap_s: float = 0.05
     backward_jump_s: float = 1.0
     acquire_s: float = 0.1

@@ -32,7 +32,7 @@ def walker():
 def parameters(home: Path) -> str:
     """A parameter file with a ledger in a directory, which is written when it is asked for."""
     file, ledger = home / "monitor.yaml", home / "wear.ledger"
-    file.write_text(f"/**: {{ros__parameters: {{ledger: {{path: {ledger}, checkpoint_s: 600.0}}}}}}\n")
+    file.write_text(f"/**: {{ros__parameters: {{ledger: {{path: {ledger}}}}}}}\n")
     return str(file)
 
 

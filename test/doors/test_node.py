@@ -50,7 +50,7 @@ SERVICES = {
     "acknowledge_alarms": Trigger, "save_state": Trigger, "reset_wear/G": Trigger, "undo_reset/G": Trigger,
     "measure": SetParametersAtomically,
 }  # fmt: skip
-PARAMETERS = {"diagnosis.enabled": "false", "diagnostics.period_s": "0.2", "wear_acceleration": "1.0e5"}
+PARAMETERS = {"diagnosis.enabled": "false", "wear_acceleration": "1.0e5"}
 PARAMETERS |= {"table.rate_hz": "100.0"}  # a parameter file may have it for replay; the node takes no notice
 
 
@@ -317,7 +317,7 @@ def messages_of(path: Path) -> dict[str, list[bytes]]:
 def test_a_replay_of_the_recording_gives_the_live_reports_byte_for_byte(
     scene: Scene, parameters, tmp_path: Path
 ) -> None:
-    own = parameters(diagnosis__enabled=False, diagnostics__period_s=0.2, wear_acceleration=1.0e5)
+    own = parameters(diagnosis__enabled=False, wear_acceleration=1.0e5)
     lw.replay(scene.home / "left.mcap", own, out=tmp_path)
     live, replayed = messages_of(scene.home / "left.mcap"), messages_of(tmp_path / "reports.mcap")
     for topic in ("clearance_states", "impact_forces", "predicted_torque"):

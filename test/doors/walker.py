@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+import attrs
 import numpy as np
 
 import leg_wear_monitor as lw
@@ -23,6 +24,7 @@ def walk(begin_s: float, end_s: float) -> Iterator[Any]:
 def opened(parameters: str) -> lw.WearMonitor:
     """A monitor on the ledger that the parameters name."""
     config = lw.load_config(parameters)
+    config = attrs.evolve(config, ledger=attrs.evolve(config.ledger, checkpoint_s=600.0))
     leg = lw.load_mechanism(config.mechanism)
     return lw.WearMonitor(leg, config, lw.open_ledger(leg, config))
 

@@ -14,6 +14,7 @@ from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor import open_ledger as wear_ledger
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import Binding, Entry, JointWear, WalkedLoad
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.state import Level
@@ -89,9 +90,12 @@ def begin(leg: Mechanism, tmp_path: Path) -> Iterator[Callable[..., WearMonitor]
     """Begin a run of a monitor of joints A and G on the ledger of this test; all are closed at its end."""
     begun = []
 
-    def run(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
+    def run(
+        values: Mapping[str, Any] = MappingProxyType({}),
+        changed: Callable[[MonitorConfig], MonitorConfig] = lambda config: config,
+    ) -> WearMonitor:
         own = {"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]}
-        config = config_from(own | dict(values))
+        config = changed(config_from(own | dict(values)))
         begun.append(wear_ledger(leg, config))
         return WearMonitor(leg, config, begun[-1])
 

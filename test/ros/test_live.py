@@ -93,7 +93,7 @@ def test_reliable_and_best_effort_publishers_are_heard_whatever_time_ros_has(sta
 
 def test_a_publisher_that_does_not_fit_is_reported(stage, walk) -> None:
     override = "qos_overrides./joint_states.subscription.reliability"
-    monitor = stage.monitor(**{override: "reliable", "diagnostics.period_s": 0.1})
+    monitor = stage.monitor(**{override: "reliable"})
     heard = stage.listen("/diagnostics", DiagnosticArray)
     stage.legs(reliable=False)
 
@@ -174,7 +174,7 @@ def test_a_foot_load_is_taken_reported_recorded_and_replayed(
     sensor = FootLoadSensorConfig(source=source, silent_from_s=3.0)
     config = PublisherConfig(duration_s=4.0, load=LoadConfig(ground_n=300.0), foot_load_sensor=sensor)
     values = {"foot_load__source": source, "load__model": model, "diagnosis__enabled": False}
-    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
+    monitor = stage.monitor(record__path=str(recording), **values)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     block_s = 1.0e-4 if source == "contact" else 0.015
     stage.legs(load=source).play(stage.walk(config), monitor, block_s=block_s, before=arrive_at)

@@ -30,12 +30,12 @@ _Sourced = TypeVar("_Sourced", "Drive", "Material")
 
 
 _FIGURES = {
-    "lag_s": "lag",
-    "bandwidth_hz": "bandwidth",
-    "load_friction": "load friction",
-    "coulomb_nm": "Coulomb friction",
-    "viscous_nms": "viscous friction",
-    "stiffness_nm_per_rad": "stiffness",
+    "lag_s": "lag {:.4g} s",
+    "bandwidth_hz": "bandwidth {:.4g} Hz",
+    "load_friction": "load friction {:.4g}",
+    "coulomb_nm": "Coulomb friction {:.4g} N m",
+    "viscous_nms": "viscous friction {:.4g} N m s/rad",
+    "stiffness_nm_per_rad": "stiffness {:.4g} N m/rad",
 }
 _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
@@ -207,16 +207,12 @@ def _parameters(path: str, node: str | None = None) -> str:
 
 def _drive(parameters: "DriveParameters", path: str) -> str:
     """The declared values of the drive, on a separate line; empty if none is declared."""
-    from leg_wear_monitor.monitor.config.parameters import PARAMETERS
     from leg_wear_monitor.monitor.config.sections import drive_figures
 
     declared = drive_figures(parameters, path).declared
     if not (declared or parameters.type):
         return ""
-    known = [
-        f"{_FIGURES[name]} {value:.4g} {PARAMETERS[f'drive.{name}'].unit}".rstrip()
-        for name, value in declared.items()
-    ]
+    known = [_FIGURES[name].format(value) for name, value in declared.items()]
     drive = f"\n{'':13} drive {parameters.type}".rstrip()
     return f"{drive}, at the crank: {', '.join(known) or 'no figure is declared'}; the rest is estimated"
 

@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.plausible import limit_fault
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
-from leg_wear_monitor.monitor.config.inputs import INTERFACE
+from leg_wear_monitor.monitor.config.inputs import INTERFACE, MAX_LAG_S
 from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin import sample
@@ -75,10 +75,9 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
         is above the bushing's radius, which no clearance reaches.
     """
     clearance_joints, limits = mechanism.clearance_joints, config.limits
-    for name in ("joint_impact_force_n", "joint_clearance_m"):
-        given = getattr(limits, name)
-        if given and len(given) != len(clearance_joints):
-            raise _wrong_length(source, f"limits.{name}", given, clearance_joints, "")
+    given = limits.joint_clearance_m
+    if given and len(given) != len(clearance_joints):
+        raise _wrong_length(source, "limits.joint_clearance_m", given, clearance_joints, "")
     key, each = limits.of_clearances(len(clearance_joints))
     for joint, limit in zip(clearance_joints, each, strict=True):
         clearance = mechanism.clearances[joint]
@@ -94,24 +93,15 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.T
     Raises
     ------
     ConfigError
-        If the reorder window is not shorter than the bridged gaps; for a measured load without forces.
+        For a measured load without forces.
     """
-    tracker, cadence = config.tracker, config.cadence
-    if not tracker.reorder_window_s < tracker.gap_limit_s:
-        raise ConfigError(
-            source,
-            "tracker.reorder_window_s",
-            f"{tracker.reorder_window_s!r} s is not below tracker.gap_limit_s, {tracker.gap_limit_s!r} s",
-        )
+    cadence = config.cadence
     if config.load.model == sample.MEASURED and config.foot_load.source in (sample.NO_LOAD, sample.CONTACT):
         fault = f"{sample.MEASURED!r} needs forces, and foot_load.source is {config.foot_load.source!r}"
         raise ConfigError(source, "load.model", fault)
     return sample.TwinSettings(
         tracker=sample.TrackerSettings(
             commanded_speed_radps=TURN * (cadence.commanded_rpm / 60.0),
-            bandwidth_hz=tracker.bandwidth_hz,
-            reorder_window_s=tracker.reorder_window_s,
-            bridge_limit_s=tracker.gap_limit_s,
             speed_tolerance=cadence.tolerance_rpm / abs(cadence.commanded_rpm),
         ),
         wear_acceleration=config.wear_acceleration,
@@ -125,8 +115,8 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.T
 
 
 def largest_lag_s(config: MonitorConfig) -> float:
-    """Largest lag that a torque may have: the declared lag of the drive, and `drive_torque.max_lag_s`."""
-    return config.drive_torque.max_lag_s + drive_figures(config.drive).lateness_s
+    """Largest lag that a torque may have: the declared lag of the drive, and `MAX_LAG_S`."""
+    return MAX_LAG_S + drive_figures(config.drive).lateness_s
 
 
 def _check_joints(clearance_joints: Sequence[str], mechanism: Mechanism, source: str) -> None:

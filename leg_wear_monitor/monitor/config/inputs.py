@@ -12,6 +12,10 @@ from leg_wear_monitor.twin import sample
 LIVE = {"live": True}  # may change while the monitor runs
 live_quantity = partial(quantity, metadata=LIVE)
 
+# Largest delay of the measured torque, late or early, in addition to the declared lag and low-pass of the
+# drive. A larger delay may be a wrong crank.offset_rad: 5 ms look like 31 mrad at 60 rpm.
+MAX_LAG_S = 0.005
+
 TORQUE_SOURCES = WRENCH, FLOAT64, EFFORT, INTERFACE = ("wrench", "float64", "effort", "interface")
 KNOWN, AT_START = ZEROS = ("known", "at_start")
 
@@ -108,18 +112,10 @@ class Encoders:
         default=(),
         check=_signs,
     )
-    commissioning_cycles: int = quantity(
-        "",
-        "gait cycles in which the monitor estimates offset and scale of a new encoder",
-        within=(20, 10000),
-        default=100,
-    )
-    window_cycles: int = quantity(
-        "",
-        "gait cycles per clearance estimate; a sudden change shows after half of them",
-        within=(20, 2000),
-        default=60,
-    )
+    # gait cycles in which offset and scale of a new encoder are estimated
+    commissioning_cycles: int = 100
+    # gait cycles per clearance estimate: a sudden change shows after half of them
+    window_cycles: int = 60
 
     def __attrs_post_init__(self) -> None:
         for key, given in (("joints", self.joints), ("signs", self.signs)):
@@ -159,27 +155,6 @@ class DriveTorque:
     )
     gear_ratio: float = quantity(
         "", "turns of the sensor's shaft per turn of the crank", within=(1.0e-4, 1.0e4), default=1.0
-    )
-    max_friction_nm: float = live_quantity(
-        "N m",
-        "largest friction of the drive at the crank; a larger constant torque is a bias; 0 means 0.3 of the "
-        "predicted RMS",
-        within=(0.0, 1.0e6),
-        default=0.0,
-    )
-    max_lag_s: float = live_quantity(
-        "s",
-        "largest delay of the measured torque, late or early, in addition to drive.lag_s and "
-        "drive.bandwidth_hz; a larger delay may be a wrong crank.offset_rad",
-        above=0.0,
-        at_most=1.0,
-        default=0.005,
-    )
-    saturation_nm: float = live_quantity(
-        "N m",
-        "torque on the crank at which the sensor saturates; 0 if unknown",
-        within=(0.0, 1.0e6),
-        default=0.0,
     )
 
 
@@ -250,20 +225,3 @@ class Cadence:
     def allows(self, rpm: float) -> bool:
         """Whether predictions are valid at a cadence [rpm]."""
         return abs(rpm - self.commanded_rpm) <= self.tolerance_rpm
-
-
-@attrs.frozen(kw_only=True)
-class Tracker:
-    """How the crank's motion is estimated from its samples."""
-
-    bandwidth_hz: float = quantity("Hz", "bandwidth of the crank's tracker", within=(1.0, 100.0), default=8.0)
-    reorder_window_s: float = quantity(
-        "s", "time for which a sample waits for earlier ones", within=(0.0, 0.5), default=0.02
-    )
-    gap_limit_s: float = quantity(
-        "s",
-        "longest gap that the monitor bridges at the tracked speed; longer gaps are unmonitored",
-        above=0.0,
-        at_most=10.0,
-        default=0.5,
-    )

@@ -1,10 +1,8 @@
 """Sections of the parameters: drive, forecast."""
 
-from typing import Any
-
 import attrs
 
-from leg_wear_monitor.configuration import USUAL, FieldError, described, quantity
+from leg_wear_monitor.configuration import USUAL, described, quantity
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
@@ -12,40 +10,21 @@ from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
 # Declared values of the drive: a file by name, and numbers that override it.
 
 
-NOT_DECLARED = -1.0
-
-
 def _figure(
-    unit: str,
-    doc: str,
-    least: float,
-    most: float,
-    usual: tuple[float, float],
-    slip: str = "",
-    otherwise: str = "an estimate",
+    unit: str, doc: str, most: float, usual: tuple[float, float], slip: str, otherwise: str = "an estimate"
 ) -> float:
-    """Parameter for a value within bounds, or `NOT_DECLARED`; ``slip`` is the unit that is likely meant.
+    """Parameter for a declared value, 0 if it is not declared; ``slip`` is the unit that is likely meant.
 
     The usual range includes all drives of config/drives and measured drives, with a factor of ten and more:
     geared servos of 0.4 N m to harmonic drives of 100, belts, springs in series.
     """
-
-    def fault(value: float) -> str | None:
-        if value == NOT_DECLARED or least <= value <= most:
-            return None
-        bounds = f"{least:g} to {most:g} {unit}".rstrip()
-        return f"{value!r} is not within its bounds, expected {bounds}, or {NOT_DECLARED} if not declared"
-
-    text = f"{doc}; {NOT_DECLARED:g} takes the value of drive.type or {otherwise}"
-    words = USUAL if unit else "{value:g}, usual are {usual}"
     number: float = quantity(
         unit,
-        text,
-        within=(NOT_DECLARED, most),
+        f"{doc}; 0 takes the value of drive.type or {otherwise}",
+        within=(0.0, most),
         usual=usual,
-        doubt=f"{words}; {slip}?" if slip else words,
-        default=NOT_DECLARED,
-        check=fault,
+        doubt=f"{USUAL}; {slip}?" if slip else USUAL,
+        default=0.0,
     )
     return number
 
@@ -63,30 +42,20 @@ class DriveParameters:
         within=(1.0e-4, 1.0e4),
         default=1.0,
     )
-    lag_s: float = _figure("s", "delay of the measured torque", 0.0, 1.0, (0.0, 0.1), "ms for s")
+    lag_s: float = _figure("s", "delay of the measured torque", 1.0, (0.0, 0.1), "ms for s")
     bandwidth_hz: float = _figure(
         "Hz",
         "corner frequency of the low-pass between crank torque and measured torque",
-        0.01,
         1.0e5,
         (1.0, 2.0e4),
         "kHz for Hz",
     )
-    load_friction: float = _figure(
-        "", "load friction of the drive, as a fraction of the torque", 0.0, 0.9, (0.0, 0.6)
-    )
-    coulomb_nm: float = _figure(
-        "N m", "constant friction of the drive, at the crank", 0.0, 1.0e6, (0.0, 100.0), "N mm for N m"
-    )
-    viscous_nms: float = _figure(
-        "N m s/rad", "viscous friction of the drive, at the crank", 0.0, 1.0e6, (0.0, 100.0)
-    )
     stiffness_nm_per_rad: float = _figure(
         "N m/rad",
         "stiffness between the measured angle and the crank, at the crank",
-        1.0e-3,
         1.0e12,
         (5.0, 1.0e7),
+        "",
         otherwise="a rigid drive",
     )
     temperature_interface: str = described(
@@ -108,8 +77,7 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
     Raises
     ------
     ConfigError
-        If there is no drive of this name, with the nearest name, if its file has a fault, or if a value of
-        the file is at the crank beyond the bounds of the parameter that overrides it.
+        If there is no drive of this name, with the nearest name, or if its file has a fault.
     """
     figures = DriveFigures()
     if parameters.type:
@@ -117,14 +85,8 @@ def drive_figures(parameters: DriveParameters, source: str = "parameters") -> Dr
         if fault:
             raise ConfigError(source, "drive.type", f"{parameters.type!r}: {fault}")
         figures = _of_file(load_drive(parameters.type), parameters.gear_ratio)
-    given = {name: getattr(parameters, name) for name in attrs.asdict(figures)}
-    figures = attrs.evolve(figures, **{name: value for name, value in given.items() if value != NOT_DECLARED})
-    at_crank: dict[str, Any] = dict(figures.declared)
-    try:
-        attrs.evolve(parameters, **at_crank)
-    except FieldError as error:
-        raise ConfigError(source, "drive.type", f"{parameters.type!r} gives at the crank {error}") from None
-    return figures
+    given = {name: getattr(parameters, name) for name in ("lag_s", "bandwidth_hz", "stiffness_nm_per_rad")}
+    return attrs.evolve(figures, **{name: value for name, value in given.items() if value})
 
 
 def _of_file(drive: Drive, output_turns: float) -> DriveFigures:

@@ -16,7 +16,6 @@ from leg_wear_monitor.monitor.config.inputs import (
     Encoders,
     FootLoad,
     Load,
-    Tracker,
     live_quantity,
 )
 from leg_wear_monitor.monitor.config.sections import DriveParameters, Forecasting
@@ -31,9 +30,6 @@ def _filled(text: str) -> str | None:
 class Limits:
     """Limits of alarms: ERROR at the limit, WARN at a fraction of it."""
 
-    warn_fraction: float = live_quantity(
-        "", "alarm level WARN begins at this fraction of a limit", above=0.0, at_most=1.0, default=0.8
-    )
     impact_force_n: float = live_quantity(
         "N",
         "limit of the impact force in a joint (peak of a gait cycle)",
@@ -42,15 +38,6 @@ class Limits:
         usual=(10.0, 1.0e7),
         doubt="{value:g} N is less than a leg weighs; kN for N?",
         default=10000.0,
-    )
-    joint_impact_force_n: tuple[float, ...] = live_quantity(
-        "N",
-        "impact-force limit of each clearance joint, instead of the common one",
-        above=0.0,
-        at_most=1.0e7,
-        usual=(10.0, 1.0e7),
-        doubt="{value:g} N is less than a leg weighs; kN for N?",
-        default=(),
     )
     clearance_m: float = live_quantity(
         "m", "limit of a joint's mean radial clearance", above=0.0, at_most=0.1, default=0.0006
@@ -61,13 +48,6 @@ class Limits:
         above=0.0,
         at_most=0.1,
         default=(),
-    )
-    clearance_departure_m: float = live_quantity(
-        "m",
-        "limit of the difference between a clearance from further encoders and the modelled clearance",
-        above=0.0,
-        at_most=0.1,
-        default=0.0001,
     )
     growth_m_per_hour: float = live_quantity(
         "m/h", "limit of the growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6
@@ -85,34 +65,6 @@ class Limits:
         at_most=100.0,
         default=0.1,
     )
-    torque_bias_nm: float = live_quantity(
-        "N m",
-        "limit of a constant torque that friction cannot cause; 0 means a tenth of the predicted RMS",
-        within=(0.0, 1.0e6),
-        default=0.0,
-    )
-    torque_drift_nm: float = live_quantity(
-        "N m",
-        "limit of the change of the constant torque since commissioning; 0 means 0.15 of the predicted RMS",
-        within=(0.0, 1.0e6),
-        default=0.0,
-    )
-    min_rate_hz: float = live_quantity(
-        "Hz", "lowest accepted rate of crank samples", above=0.0, at_most=1.0e5, default=40.0
-    )
-    bad_sample_fraction: float = live_quantity(
-        "", "limit of the fraction of unusable samples", above=0.0, at_most=1.0, default=0.05
-    )
-    stuck_torque_fraction: float = live_quantity(
-        "",
-        "limit of the fraction of torque samples that are saturated or stuck at an extreme value",
-        above=0.0,
-        at_most=1.0,
-        default=0.3,
-    )
-    lost_time_fraction: float = live_quantity(
-        "", "limit of the fraction of unmonitored time", above=0.0, at_most=1.0, default=0.05
-    )
 
     def of_clearances(self, joints: int) -> tuple[str, tuple[float, ...]]:
         """The parameter that limits the clearances, and the limit of each of so many clearance joints [m]."""
@@ -125,21 +77,8 @@ class Limits:
 class Alarms:
     """When a level changes."""
 
-    deadband: float = 0.05  # over a limit; a value at its limit must not switch the level in each gait cycle
     on_delay_cycles: int = live_quantity(
         "", "consecutive gait cycles beyond a limit before the level rises", within=(1, 1000), default=3
-    )
-    impact_on_delay_cycles: int = live_quantity(
-        "", "the same for alarms of impact forces", within=(1, 1000), default=1
-    )
-
-
-@attrs.frozen(kw_only=True)
-class Growth:
-    """How growth is averaged."""
-
-    window_cycles: int = quantity(
-        "", "gait cycles over which growth is averaged", within=(3, 10000), default=30
     )
 
 
@@ -148,12 +87,8 @@ class LedgerFile:
     """File that stores the wear."""
 
     path: str = described("file of the ledger; if empty, the wear is lost when the monitor ends", default="")
-    checkpoint_s: float = quantity(
-        "s",
-        "longest time between two ledger entries while the leg moves, plus a quarter of a gait cycle",
-        within=(0.01, 600.0),
-        default=5.0,
-    )
+    # longest time between two entries while the leg moves: a kill of the process loses this much at most
+    checkpoint_s: float = 5.0
     skip_counted: bool = described("skip samples whose time is in the ledger already", default=True)
 
 
@@ -166,15 +101,6 @@ class Record:
         "directory for MCAP files of the 30 s before and 10 s after each stop verdict; if empty, none is "
         "written",
         default="",
-    )
-
-
-@attrs.frozen(kw_only=True)
-class Diagnostics:
-    """Content of /diagnostics."""
-
-    period_s: float = quantity(
-        "s", "time between two messages on /diagnostics", within=(0.1, 2.0), default=1.0
     )
 
 
@@ -241,15 +167,12 @@ class MonitorConfig:
     load: Load = described("", factory=Load)
     table: TableInput = described("", factory=TableInput)
     cadence: Cadence = described("", factory=Cadence)
-    tracker: Tracker = described("", factory=Tracker)
     limits: Limits = described("", factory=Limits)
     alarms: Alarms = described("", factory=Alarms)
-    growth: Growth = described("", factory=Growth)
     forecast: Forecasting = described("", factory=Forecasting)
     diagnosis: TorqueDiagnosis = described("", factory=TorqueDiagnosis)
     ledger: LedgerFile = described("", factory=LedgerFile)
     record: Record = described("", factory=Record)
-    diagnostics: Diagnostics = described("", factory=Diagnostics)
     publish_impact_forces: bool = described(
         "publish the contact forces of every sample", default=True, metadata=LIVE
     )

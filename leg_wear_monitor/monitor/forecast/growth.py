@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
+GROWTH_CYCLES = 30  # over which the reported growth is averaged
 LEAST_CYCLES = 10
 LARGEST_ERROR = 0.5  # fraction of the mean: beyond it, the mean says nothing
 

@@ -10,6 +10,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
 from leg_wear_monitor.mechanism.spec import Clearance
+from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
@@ -76,8 +77,8 @@ class MeasurementResult:
     eased : str
         Effect on an alarm of the clearance that an earlier measurement had raised, such as ``ends``; empty if
         it stays.
-    limit_m, warn_fraction : float
-        Limit of the joint's clearance, and the fraction of it at which its alarm begins.
+    limit_m : float
+        Limit of the joint's clearance.
     earlier : sequence of Measurement
         All of the ledger, without this one.
     """
@@ -93,7 +94,6 @@ class MeasurementResult:
     shown_by: str = ""
     eased: str = ""
     limit_m: float = math.nan
-    warn_fraction: float = math.nan
     earlier: Sequence[Measurement] = ()
 
     @property
@@ -117,7 +117,7 @@ class MeasurementResult:
     @property
     def lines(self) -> tuple[str, ...]:
         """The measurement and its effects for operators, one line each."""
-        now, limit_m, warn_fraction = self.measurement, self.limit_m, self.warn_fraction
+        now, limit_m = self.measurement, self.limit_m
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
         lines.append(f"the model has {_mm(self.modelled_m)} (limit {_mm(limit_m)}) and stays as it is")
@@ -125,8 +125,8 @@ class MeasurementResult:
             lines.append(
                 f"{AT_LIMIT}: stop the leg when it is safe; the alarm clearance {now.joint} is raised"
             )
-        elif now.clearance_m >= warn_fraction * limit_m:
-            part = f"{100.0 * warn_fraction:g} % of its limit"
+        elif now.clearance_m >= WARN_FRACTION * limit_m:
+            part = f"{100.0 * WARN_FRACTION:g} % of its limit"
             lines.append(f"the measured clearance is above {part}: the alarm clearance {now.joint} is raised")
         if self.eased:
             lines.append(f"the alarm clearance {now.joint} that an earlier measurement raised {self.eased}")

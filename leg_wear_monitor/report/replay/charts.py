@@ -171,10 +171,7 @@ def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
         for name, colour, columns in forces
         if joint in columns and _is_known(columns[joint])
     ]
-    limits = summary.monitor.limits
-    limit = dict(zip(summary.joints, limits.joint_impact_force_n, strict=False)).get(
-        joint, limits.impact_force_n
-    )
+    limit = summary.monitor.limits.impact_force_n
     if any(np.nanmax(one.values) > limit / _NEAR for one in series):
         series.append(_limit("limit", "N", limit, summary.history.stamp_ns))
     is_valid = Figure.IMPACT_FORCES not in summary.verdict.not_valid

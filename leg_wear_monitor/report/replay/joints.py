@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms import joint_of
+from leg_wear_monitor.monitor.alarms import WARN_FRACTION, joint_of
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
 from leg_wear_monitor.monitor.verdict.situation import SOURCES
 from leg_wear_monitor.recordings.result import Place, ReplaySummary
@@ -87,7 +87,7 @@ def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, 
         return "over"
     if is_named and summary.verdict.state is State.INSPECT:
         return "near"
-    warn_m = summary.monitor.limits.warn_fraction * clearance.limit_m
+    warn_m = WARN_FRACTION * clearance.limit_m
     return "near" if used >= _NEAR or clearance.best_estimate_m >= warn_m > clearance.new_m else "fine"
 
 

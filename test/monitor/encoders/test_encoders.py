@@ -4,6 +4,7 @@ import math
 import sqlite3
 from contextlib import closing
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,8 +23,7 @@ from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, ang
 from leg_wear_monitor.twin.sample import EMPTY
 
 NAMES, JOINTS = ("hip", "knee", "ankle"), ("B", "G", "I")
-WATCHED = {"encoders.names": NAMES, "encoders.joints": JOINTS, "encoders.commissioning_cycles": 20}
-WATCHED["encoders.window_cycles"] = 20
+WATCHED = {"encoders.names": NAMES, "encoders.joints": JOINTS}
 FRESH = np.full(5, 3.0e-4)
 ERRORS = np.array([1e-3, 0.01, -0.02, 0.015, 2e-3, -1e-3, 3e-3])  # crank's offset, offsets, scales
 REFERENCE_CYCLES = 1  # for time: the encoders here obey the reference, whatever it is
@@ -58,6 +58,12 @@ def read(leg, gait, reference):
     return make
 
 
+def soon(config):
+    """The configuration with few gait cycles for each estimate."""
+    few = attrs.evolve(config.encoders, commissioning_cycles=20, window_cycles=20)
+    return attrs.evolve(config, encoders=few)
+
+
 def quick(monitor):
     """With the reference that encoders obey: of so few cycles, any other is not like it."""
     run = monitor._leg.encoders.encoders._reference
@@ -69,7 +75,7 @@ def quick(monitor):
 @pytest.fixture(scope="module")
 def new_watch(leg):
     """Makes a monitor with encoders."""
-    return lambda: quick(WearMonitor(leg, config_from(WATCHED)))
+    return lambda: quick(WearMonitor(leg, soon(config_from(WATCHED))))
 
 
 @pytest.fixture(scope="module")
@@ -196,13 +202,13 @@ def test_an_encoder_on_another_joint_than_said_is_reported(new_watch, read):
 
 def test_a_sensor_added_later_is_commissioned_then_and_all_is_held(begin, read, tmp_path):
     whole = WATCHED | {"clearance_joints": []}
-    first = quick(begin(whole | {"encoders.names": ["hip"], "encoders.joints": ["B"]}))
+    first = quick(begin(whole | {"encoders.names": ["hip"], "encoders.joints": ["B"]}, soon))
     reports = first.update(read(24.0))
     shown = [one.observation for one in seen(reports).values()]
     assert shown[3:] == [ClearanceObservation.NOT_OBSERVABLE] * 2
     offset = status_of(first, "encoders").values["hip_offset_rad"]
     first.close()
-    second = quick(begin(whole))
+    second = quick(begin(whole, soon))
     assert status_of(second, "encoders").values["hip_offset_rad"] == offset
     assert "knee_offset_rad" not in status_of(second, "encoders").values
     reports = second.update(read(25.0, 24.0))

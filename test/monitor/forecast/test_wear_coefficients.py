@@ -150,7 +150,7 @@ def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
     result = found(worn(5e-11), 0.63, accept=True)
     assert "that is 6.5e-09 1/Pa, usual are below 1e-09 1/Pa" in result.words[-1]
     shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
-    assert result.words[-1] in attrs.evolve(shown, limit_m=1e-3, warn_fraction=0.8).lines
+    assert result.words[-1] in attrs.evolve(shown, limit_m=1e-3).lines
     assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]
 
 

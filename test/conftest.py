@@ -40,7 +40,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache of compiled code, as a new process would find it."""
 
     def forget() -> None:
-        for cached in (code_cache._home, code_cache.code_directory, kernel.cache_directory):
+        for cached in (code_cache._place, kernel.cache_directory):
             cached.cache_clear()
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))

@@ -351,8 +351,7 @@ def cache(fill: bool, clear: bool) -> None:
 
     After `--fill` the first simulation, replay and start of a node are as fast as later ones.
 
-    Each change of the source makes a new version. The two versions that were used last are kept, and all
-    versions that were used within a day.
+    Each change of the source makes a new version. Old versions are kept until `--clear`.
     """
     from leg_wear_monitor.compiled.cache import kept_directories
     from leg_wear_monitor.compiled.kernel import cache_directory

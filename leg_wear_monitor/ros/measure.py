@@ -19,7 +19,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean, printable
-from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
+from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED, with_codes
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 # Service ``~/measure``: the operator enters a measured clearance while the monitor runs.
@@ -83,7 +83,7 @@ def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str
         If the joint has no clearance, or a value is impossible; then nothing is entered.
     """
     found = monitor.measure(**wanted, stamp_ns=stamp_ns, who=WHO)
-    return with_storage("; ".join(found.lines), not_stored(monitor))
+    return with_storage("; ".join(found.lines), not_stored(monitor), found.codes)
 
 
 def not_stored(monitor: WearMonitor) -> str:
@@ -95,9 +95,11 @@ def not_stored(monitor: WearMonitor) -> str:
     return ""
 
 
-def with_storage(reply: str, fault: str) -> str:
-    """Reply to an operator, with the fault of `not_stored` at its end."""
-    return f"{reply}; {NOT_STORED}: {fault}" if fault else reply
+def with_storage(reply: str, fault: str, codes: Sequence[str] = ()) -> str:
+    """Reply to an operator, with its codes at its start and the fault of `not_stored` at its end."""
+    if fault:
+        return with_codes([*codes, NOT_STORED], f"{reply}; it is not stored: {fault}")
+    return with_codes(codes, reply)
 
 
 def offer_measure(node: Node, act: Callable[[dict[str, Any]], str]) -> None:

@@ -8,6 +8,7 @@ from ledger_contents import rows_of
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.measurement import with_codes
 from leg_wear_monitor.state import Level
 
 
@@ -293,3 +294,14 @@ def test_a_measurement_that_ends_the_stop_of_an_earlier_one_says_so(run, ledger)
     second = run("measure", "A", "0.36", *kept)
     assert "the alarm clearance A that an earlier measurement raised ends" in second.stdout
     assert alarms(ledger)[0] == []
+
+
+@pytest.mark.parametrize(
+    ("codes", "code"), [((), 0), (("AT_LIMIT",), 1), (("CONTRADICTS_MODEL", "NOT_STORED"), 1)]
+)
+def test_the_codes_of_a_node_are_findings(run, monkeypatch, codes, code):
+    client = pytest.importorskip("leg_wear_monitor.ros.measure")
+    reply = with_codes(codes, "A: 0.42 mm, in whatever words")
+    monkeypatch.setattr(client, "measure_on", lambda *_: reply)
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--node", "/leg")
+    assert (result.exit_code, result.stdout) == (code, f"{reply}\n")

@@ -152,11 +152,11 @@ def _date(stamp_ns: int) -> str:
 
 def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
     """Have a running monitor do it, print its reply, and return the exit code."""
-    from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED
+    from leg_wear_monitor.monitor.forecast.measurement import has_codes
 
     reply = common.trigger(node, service, wait_s, times)
     click.echo(reply)
-    return common.WITH_FINDINGS if NOT_STORED in reply else 0
+    return common.WITH_FINDINGS if has_codes(reply) else 0
 
 
 # ``leg-wear-monitor acknowledge``: alarms that an operator has seen to.
@@ -301,15 +301,15 @@ def measure(
     with opened(**options, joint=joint, node=node) as monitor:
         found = monitor.measure(*size, time.time_ns(), getpass.getuser(), accept)
     _say(found.lines, options["dry_run"])
-    return common.WITH_FINDINGS if found.has_findings else 0
+    return common.WITH_FINDINGS if found.codes else 0
 
 
 def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
     """Enter it into a running monitor, which says the same as the verb does with a ledger."""
     common.need_rclpy()
-    from leg_wear_monitor.monitor.forecast.measurement import asks_to_act
+    from leg_wear_monitor.monitor.forecast.measurement import has_codes
     from leg_wear_monitor.ros.measure import measure_on
 
     reply = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
     click.echo(reply)
-    return common.WITH_FINDINGS if asks_to_act(reply) else 0
+    return common.WITH_FINDINGS if has_codes(reply) else 0

@@ -47,10 +47,9 @@ def validity(measurements: Sequence[Measurement]) -> str:
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
 
-CONTRADICTION = "this contradicts the model"
 AGREES = "this agrees with what"
-AT_LIMIT = "the measured clearance is at its limit"
-NOT_STORED = "it is not stored"
+AT_LIMIT, CONTRADICTS_MODEL, NOT_STORED = "AT_LIMIT", "CONTRADICTS_MODEL", "NOT_STORED"
+"""Codes that begin a service's reply in brackets if the operator has to act: ``[AT_LIMIT] A: …``."""
 
 _SAYS_SOMETHING = 0.9  # a measurement is informative if it leaves at most this fraction of the spread
 
@@ -123,7 +122,8 @@ class MeasurementResult:
         lines.append(f"the model has {_mm(self.modelled_m)} (limit {_mm(limit_m)}) and stays as it is")
         if now.clearance_m >= limit_m:
             lines.append(
-                f"{AT_LIMIT}: stop the leg when it is safe; the alarm clearance {now.joint} is raised"
+                "the measured clearance is at its limit: stop the leg when it is safe; "
+                f"the alarm clearance {now.joint} is raised"
             )
         elif now.clearance_m >= WARN_FRACTION * limit_m:
             part = f"{100.0 * WARN_FRACTION:g} % of its limit"
@@ -139,15 +139,20 @@ class MeasurementResult:
         return (*lines, *self.words, validity([*self.earlier, now]))
 
     @property
-    def has_findings(self) -> bool:
-        """Whether the caller has to act: the measurement contradicts the model, or is at the limit."""
-        is_odd = self.contradicts and not self.agrees
-        return is_odd or self.measurement.clearance_m >= self.limit_m
+    def codes(self) -> list[str]:
+        """Codes of the findings on which the caller has to act."""
+        at_limit = [AT_LIMIT] if self.measurement.clearance_m >= self.limit_m else []
+        return at_limit + ([CONTRADICTS_MODEL] if self.contradicts and not self.agrees else [])
 
 
-def asks_to_act(reply: str) -> bool:
-    """Whether a node's reply to a measurement contains a finding, or that the measurement is not stored."""
-    return any(words in reply for words in (AT_LIMIT, CONTRADICTION, NOT_STORED))
+def with_codes(codes: Sequence[str], reply: str) -> str:
+    """A reply of a service that begins with codes; `has_codes` finds them."""
+    return f"[{', '.join(codes)}] {reply}" if codes else reply
+
+
+def has_codes(reply: str) -> bool:
+    """True if a service's reply has a code: the operator has to act."""
+    return reply.startswith("[")
 
 
 def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> Measurement | None:
@@ -293,7 +298,7 @@ def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     done = "it counts, as requested" if accept else "it is kept in the ledger, but does not count"
     last = "" if accept else "; if the measurement is correct, use --accept"
     return [
-        f"{CONTRADICTION}: the clearance of {joint} is far {more} than possible; {done}",
+        f"this contradicts the model: the clearance of {joint} is far {more} than possible; {done}",
         "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
         f"other than configured, correct that{last}",
     ]

@@ -5,6 +5,8 @@ from enum import Enum
 
 import attrs
 
+from leg_wear_monitor.estimate.drive import LEAST_DELAY_S, MOST_DELAY_S
+
 SURE_LOG_ODDS = 5.0  # 150 to 1
 # log odds against the runner-up: an error of the model affects all phases, and can favour a wrong joint.
 # Under 300 N of load and twice the friction, B had 7 where G was open; right names had 15 and more there, 85
@@ -170,9 +172,33 @@ class TorqueExplanation:
 
     @property
     def is_input_fault(self) -> bool:
-        """Whether the torque or the crank angle is wrong as received, and tells nothing about the leg."""
-        found = self.alternatives if self.is_whole else (self.named,)
-        return bool(found) and all(any(one.cause in INPUTS for one in each) for each in found)
+        """Whether the torque or the crank angle is wrong as received."""
+        return bool(self._possible) and all(any(map(_is_of_input, each)) for each in self._possible)
+
+    @property
+    def hides_leg(self) -> bool:
+        """Whether the received torque tells nothing about the leg.
+
+        A delay or an offset of the crank does not hide it, because the diagnosis estimates them with the leg.
+        """
+        return self.is_input_fault and not all(map(self._is_timing, self._possible))
+
+    @property
+    def _possible(self) -> tuple[tuple[NamedCause, ...], ...]:
+        """The alternatives; without the rest that they leave, only the sure one."""
+        return self.alternatives if self.is_whole else (self.named,)
+
+    def _is_timing(self, causes: tuple[NamedCause, ...]) -> bool:
+        """Whether only the time of the torque is wrong as received, by a delay that is estimated."""
+        wrong = [one for one in causes if _is_of_input(one)]
+        by_angle = (one.value for one in wrong if one.cause in (Cause.TIMING, Cause.CRANK_OFFSET))
+        late_s = sum(one.value for one in wrong if one.cause is Cause.LAG) - sum(by_angle) / self.speed_radps
+        is_time = all(one.cause in (Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG) for one in wrong)
+        return is_time and LEAST_DELAY_S < late_s < MOST_DELAY_S
+
+
+def _is_of_input(one: NamedCause) -> bool:
+    return one.cause in INPUTS
 
 
 def beyond_friction(constant_nm: float, sigma_nm: float, max_friction_nm: float) -> NamedCause:

@@ -15,7 +15,14 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, Channel, DriveFigures
+from leg_wear_monitor.estimate.drive import (
+    DIRECT,
+    LEAST_DELAY_S,
+    MOST_DELAY_S,
+    UNDECLARED,
+    Channel,
+    DriveFigures,
+)
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.estimate.signature import (
@@ -29,14 +36,14 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 
-# tried delays, from an offset of 0.13 rad at 60 rpm to a lag of 40 ms, and low-passes of 100 to 10 Hz
-_DELAYS_S = 0.005 * np.arange(-4, 9)
+# tried delays, and low-passes of 100 to 10 Hz
+_DELAYS_S = np.linspace(LEAST_DELAY_S, MOST_DELAY_S, 13)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
 _STEP_S = 0.0025  # to both sides of the best of these delays
 # The search starts at the best of them. For each free value: bounds, the difference for a derivative, the
 # longest step, and the step that ends the search.
 _RANGES = {
-    "delay_s": (-0.02, 0.04, 0.0005, 0.0025, 0.0001),
+    "delay_s": (LEAST_DELAY_S, MOST_DELAY_S, 0.0005, 0.0025, 0.0001),
     "time_constant_s": (0.0005, 0.025, 0.0005, 0.0025, 0.0001),
     "second_order": (0.0, 0.5, 0.05, 0.2, 0.01),
     "mean_s": (0.002, 0.06, 0.001, 0.005, 0.0002),

@@ -183,7 +183,7 @@ def _doubts(leg: MonitoredLeg) -> tuple[str, ...]:
     last = leg.last
     if last is None:
         return ()
-    if leg.torque.is_wrong or leg.judge.faults:
+    if leg.torque.has_input_fault or leg.judge.faults:
         last = attrs.evolve(last, torque_samples=0)
     found = doubts(last, leg.config)
     return ("; ".join(found),) if found else ()

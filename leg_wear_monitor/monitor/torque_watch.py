@@ -333,6 +333,12 @@ class TorqueWatch(Observer):
 
     @property
     def is_wrong(self) -> bool:
+        """Whether the received drive torque is so wrong that it shows nothing of the leg."""
+        explained = self.mismatch.explanation
+        return explained is not None and explained.hides_leg
+
+    @property
+    def has_input_fault(self) -> bool:
         """Whether a wrong received drive torque or crank angle explains a torque residual."""
         explained = self.mismatch.explanation
         return explained is not None and explained.is_input_fault

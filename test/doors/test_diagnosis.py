@@ -90,11 +90,23 @@ def test_two_joints_that_open_at_once_are_named_together(torque_of, table) -> No
         assert summary.clearances[joint].change_m > 5.0e-5
 
 
+def late(walk: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """A walk whose torque comes 10 ms late."""
+    return {**walk, "drive_torque": np.interp(walk["time"] - 0.01, walk["time"], walk["drive_torque"])}
+
+
 def test_a_late_torque_accuses_no_joint(torque_of, table) -> None:
-    walk = table(torque_of(TAKEN), torque_of(TAKEN))
-    late = np.interp(walk["time"] - 0.01, walk["time"], walk["drive_torque"])
-    verdict = lw.replay({**walk, "drive_torque": late}).summary().verdict
+    verdict = lw.replay(late(table(torque_of(TAKEN), torque_of(TAKEN)))).summary().verdict
     assert (verdict.fault_code, verdict.joints) == ("TORQUE_TIMING", ())
+
+
+def test_a_late_torque_hides_no_joint_that_opens(torque_of, table) -> None:
+    """The delay is not declared, and the joint opens before there is a baseline."""
+    opened_m = 4.5e-4
+    summary = lw.replay(late(table(torque_of(TAKEN), torque_of(TAKEN, G=opened_m)))).summary()
+    assert (summary.verdict.fault_code, summary.diagnosis.cause_subject) == ("CLEARANCE_CHANGED_G", "G")
+    assert "its time does not fit the crank angle" in summary.verdict.why
+    assert summary.clearances["G"].estimated_m == pytest.approx(opened_m, abs=8.0e-5)
 
 
 def test_before_a_joint_opens_nothing_is_reported(healthy) -> None:

@@ -88,6 +88,7 @@ class LegModels:
     def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
         self._mechanism, self._figures = mechanism, figures
         self._kept: list[_ModelsOfState] = []
+        self._first: tuple[tuple[TorqueReference, int], Explainer] | None = None
 
     def warm_up(self) -> None:
         """Compute the torque's derivatives by masses and lengths now: later, samples would wait too long."""
@@ -128,9 +129,13 @@ class LegModels:
         """Stamp since when some gait cycles are not like those before them; 0 where all are alike.
 
         Each number of first gait cycles is a baseline for the rest, with the tests that are used later: a
-        joint that opens while the leg is commissioned would otherwise become part of the baseline.
+        joint that opens while the leg is commissioned would otherwise become part of the baseline. If the
+        leg does not match the reference, its drive may delay the torque: the first gait cycles show the
+        drive dynamics.
         """
         own, most, since_ns = self.explainer(state), 0.0, 0
+        if state.fit is None and len(cycles) > PART_CYCLES:
+            own = self._behind_drive(state, state.baseline(cycles[:PART_CYCLES], state.modelled_m))
         for number in range(PART_CYCLES, len(cycles), PART_CYCLES):
             known = state.baseline(cycles[:number], state.modelled_m)
             detector = self._detector(compared_with(own, known), state, config)
@@ -141,6 +146,17 @@ class LegModels:
                 if beyond > most:
                     most, since_ns = beyond, detector.detected_ns(found)
         return since_ns
+
+    def _behind_drive(self, state: TorqueState, first: signature.CommissionedTorque) -> Explainer:
+        """Explainer behind the drive dynamics of the first gait cycles; found once for these cycles."""
+        reference, sensor = state.reference, state.sensor
+        if reference is None or sensor is None:
+            raise RuntimeError("there is no reference yet")
+        key = reference, first.stamp_ns
+        if self._first is None or self._first[0] != key:
+            behind = self.channel(reference, sensor, first)
+            self._first = key, explainer_of(self._mechanism, reference, behind, None)
+        return self._first[1]
 
     def misfit(self, state: TorqueState) -> float:
         """Misfit between the commissioned leg and the reference; 0 if it is not known.

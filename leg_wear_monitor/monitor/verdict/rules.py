@@ -166,7 +166,6 @@ RULES = (
     ),
     _cause("TORQUE_SIGN", "its sign is reversed", not_valid=EVERYTHING),
     _cause("TORQUE_SCALE", "its size is wrong"),
-    _cause("TORQUE_TIMING", "its time does not fit the crank angle"),
     _inspect(
         code="CLEARANCE_CHANGED",
         hits=conditions.diagnosed,
@@ -189,6 +188,7 @@ RULES = (
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
         not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
     ),
+    _cause("TORQUE_TIMING", "its time does not fit the crank angle"),
     _cause("TORQUE_MASS", "a body has a different mass", not_valid=EVERYTHING),
     _cause("MECHANISM_CHANGED", "it does not fit the model of this leg", not_valid=EVERYTHING),
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),

@@ -10,6 +10,7 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 
 NO_GAIT_CYCLE, NONE = "NO_GAIT_CYCLE", "NONE"
+_TIMING = "TORQUE_TIMING"
 
 
 def level_of(verdict: Verdict) -> Level:
@@ -41,9 +42,10 @@ def verdict_of(findings: Sequence[Verdict]) -> Verdict:
     why, blind = lead.why, [each for each in findings if each.state is State.NOT_MONITORED]
     if blind and lead.state is not State.NOT_MONITORED:
         why += f"; the leg is not monitored now: {blind[0].why}"
-    inspected = [one for one in findings if one.joints and one.state.severity >= State.INSPECT.severity]
-    if not lead.joints:  # a reason without a joint does not hide a joint
-        why += "".join(f"; also: {one.why}. To do: {one.do}" for one in inspected)
+    inspected = [one for one in findings if one.state.severity >= State.INSPECT.severity]
+    # a reason without a joint does not hide a joint, and a joint does not hide a wrong time of the torque
+    also = [one for one in inspected if (one.fault_code == _TIMING if lead.joints else one.joints)]
+    why += "".join(f"; also: {one.why}. To do: {one.do}" for one in also)
     not_valid = tuple(figure for figure in Figure if figure in found)
     return attrs.evolve(lead, why=why, evidence=tuple(evidence.values()), not_valid=not_valid)
 

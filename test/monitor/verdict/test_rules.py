@@ -369,10 +369,10 @@ def test_a_ground_that_is_not_known_accuses_no_joint() -> None:
     assert "not observable" in verdict.why and "rock" not in verdict.do
 
 
-def test_a_finding_about_timing_does_not_hide_a_joint() -> None:
+def test_a_joint_and_a_finding_about_timing_stand_together_the_joint_first() -> None:
     verdict = judged(explained=explained(Cause.TIMING), diagnosis=diagnosis(change(Cause.CLEARANCE, "G")))
-    assert (verdict.state, verdict.fault_code) == (State.INSPECT, "TORQUE_TIMING")
-    assert "also: the drive torque shows a clearance of 0.62 mm in joint G" in verdict.why
+    assert (verdict.state, verdict.fault_code) == (State.INSPECT, "CLEARANCE_CHANGED_G")
+    assert "also: the drive torque differs from the prediction: its time does not fit" in verdict.why
 
 
 def test_several_joints_stand_together_with_their_clearances() -> None:

@@ -248,7 +248,7 @@ def received_json(text: str, source: str, most: int) -> Any:
         If it is longer, or no JSON.
     """
     if len(text) > most:
-        raise ConfigError(source, "", f"has {len(text)} characters, expected {most} at most")
+        raise ConfigError(source, "", f"has {len(text)} characters. Expected {most} at most")
     try:
         return json.loads(text, parse_constant=lambda _: None)
     except (ValueError, RecursionError) as error:

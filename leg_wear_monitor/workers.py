@@ -76,7 +76,7 @@ def _from_processes(calls: Calls, workers: int) -> Iterator[tuple[str, Any]]:
         from joblib import parallel_config
         from joblib.externals.loky.process_executor import TerminatedWorkerError
     except ImportError as error:
-        fault = "needs joblib (pip install joblib), expected 1"
+        fault = "needs joblib (pip install joblib). Expected 1"
         raise ConfigError("--workers", str(workers), fault) from error
     waiting = {name: partial(_in_worker, os.getpid(), call) for name, call in calls.items()}
     for _ in range(TRIES):

@@ -41,7 +41,7 @@ def script(text: str) -> str:
         elif language == "python":
             lines.append(_PYTHON + shlex.quote(content))
         else:
-            raise ValueError(f"a block in '{language}', expected sh or python")
+            raise ValueError(f"a block in '{language}'. Expected sh or python")
     return "\n".join(lines)
 
 

@@ -240,7 +240,7 @@ def check_file(option: str, path: Path | None) -> None:
     if path is None or path == STDOUT:
         return
     if path.is_dir():
-        raise ConfigError(option, str(path), "is a directory, expected a file to write")
+        raise ConfigError(option, str(path), "is a directory. Expected a file to write")
     if not _is_stream(path):
         _try(option, path, path.resolve().parent)
 

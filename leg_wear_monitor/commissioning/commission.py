@@ -313,7 +313,7 @@ def _with_reference(
     if walk.profile is None:
         cycles, rpm = len(walk.profiles), walk.config.cadence.commanded_rpm
         why = (
-            f"diagnosis.reference: the recording has {cycles} gait cycles at {rpm:g} rpm, expected at least "
+            f"diagnosis.reference: the recording has {cycles} gait cycles at {rpm:g} rpm. Expected at least "
             f"{LEAST_CYCLES}"
         )
         return attrs.evolve(result, not_told=(*result.not_told, why))
@@ -420,7 +420,7 @@ def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointNa
         elif each.time_s[-1] - each.time_s[0] < _LEAST_S:
             duration = each.time_s[-1] - each.time_s[0]
             reasons.append(
-                f"{name.joint} was recorded for {duration:.3g} s only, expected at least {_LEAST_S:g} s"
+                f"{name.joint} was recorded for {duration:.3g} s only. Expected at least {_LEAST_S:g} s"
             )
         else:
             motions[name] = motion_of(each)

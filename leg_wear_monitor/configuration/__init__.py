@@ -149,7 +149,7 @@ def quantity(
             if above is not None and not number > above:
                 return f"{number!r} is not above {above:g} {unit}".rstrip()
             if above == 0.0 and number < LEAST:
-                return f"{number!r} is too close to 0, expected more than {LEAST:g} {unit}".rstrip()
+                return f"{number!r} is too close to 0. Expected more than {LEAST:g} {unit}".rstrip()
             if at_least is not None and not number >= at_least:
                 return f"{number!r} is not at least {at_least:g} {unit}".rstrip()
             if at_most is not None and not number <= at_most:

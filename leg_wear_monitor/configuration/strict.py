@@ -134,7 +134,7 @@ def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> Fi
     unit = f" [{attribute.metadata['unit']}]" if attribute.metadata.get("unit") else ""
     if isinstance(error, KeyError):
         doc = attribute.metadata.get("doc")
-        return FieldError(attribute.name, f"is missing, expected: {doc}{unit}" if doc else "is missing")
+        return FieldError(attribute.name, f"is missing. Expected: {doc}{unit}" if doc else "is missing")
     inner = _field_error(error)
     name = "" if attribute.metadata.get("flat") else attribute.name
     return FieldError(".".join(filter(None, (name, inner.key))), inner.fault + unit)
@@ -153,7 +153,7 @@ def _number(value: Any, _kind: Any) -> float:
     if not math.isfinite(number):
         raise FieldError("", f"{shown(value)} is not a finite number")
     if abs(number) > MOST:
-        raise FieldError("", f"{shown(value)} is too large, expected at most {MOST:g}")
+        raise FieldError("", f"{shown(value)} is too large. Expected at most {MOST:g}")
     return number
 
 
@@ -307,7 +307,7 @@ def _read_text(path: Path, source: str) -> str:
     try:
         kind = path.stat().st_mode
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
-            raise ConfigError(source, "", "is a device, expected a file")
+            raise ConfigError(source, "", "is a device. Expected a file")
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
     except FileNotFoundError:

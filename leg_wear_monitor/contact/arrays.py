@@ -82,7 +82,7 @@ def clearance_settings(
             raise ConfigError(
                 "clearances",
                 "",
-                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {known}",
+                f"{name!r} has no clearance settings in {mechanism.source}. Expected some of: {known}",
             )
         own = mechanism.clearances[name]
         try:

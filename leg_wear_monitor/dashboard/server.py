@@ -71,7 +71,7 @@ def listen(host: str, port: int) -> Place:
         raise LegWearError(f"--host: {printable(host)!r} is not a host: {error.strerror}") from error
     except PermissionError as error:
         raise LegWearError(
-            f"--port: {port} may not be used: {error.strerror}; expected one above 1023"
+            f"--port: {port} may not be used: {error.strerror}. Expected one above 1023"
         ) from error
     except OSError as error:
         reason = " ".join(str(error.strerror or error).split())

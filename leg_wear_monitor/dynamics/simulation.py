@@ -76,7 +76,7 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
         If a name is unknown or occurs twice, or for a text in place of a list: ``"AB"`` would be two joints.
     """
     if isinstance(names, str):
-        raise ConfigError("clearances", "", f"{shown(names)} is a text, expected a list of names")
+        raise ConfigError("clearances", "", f"{shown(names)} is a text. Expected a list of names")
     try:
         clearance_joints = tuple(names)
     except TypeError as error:
@@ -89,7 +89,7 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
             raise ConfigError(
                 "clearances",
                 "",
-                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {ready}"
+                f"{name!r} has no clearance settings in {mechanism.source}. Expected some of: {ready}"
                 + did_you_mean(name, mechanism.clearances),
             )
     if len(set(clearance_joints)) < len(clearance_joints):
@@ -382,8 +382,8 @@ def _check_intervals(intervals: int | None, model: str) -> None:
     if model != "clearance":
         raise ConfigError("intervals", "", f"{intervals} is for model clearance, model {model} has none")
     if not LEAST_INTERVALS <= intervals <= MOST_INTERVALS:
-        expected = f"expected {LEAST_INTERVALS} to {MOST_INTERVALS} per gait cycle"
-        raise ConfigError("intervals", "", f"{intervals} is out of bounds, {expected}")
+        expected = f"Expected {LEAST_INTERVALS} to {MOST_INTERVALS} per gait cycle"
+        raise ConfigError("intervals", "", f"{intervals} is out of bounds. {expected}")
 
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
@@ -396,8 +396,8 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
     if speed_rpm is None:
         return drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
     if not (math.isfinite(speed_rpm) and abs(speed_rpm) >= LEAST_RPM):
-        expected = f"expected a speed other than 0 rpm, from {LEAST_RPM:g} on"
-        raise ConfigError("speed-rpm", "", f"{speed_rpm} rpm does not turn the crank; {expected}")
+        expected = f"Expected a speed other than 0 rpm, from {LEAST_RPM:g} on"
+        raise ConfigError("speed-rpm", "", f"{speed_rpm} rpm does not turn the crank. {expected}")
     return speed_rpm * TURN / 60.0
 
 
@@ -415,7 +415,7 @@ def _spans(
         raise ConfigError(
             setup.linkage.mechanism.source,
             "drive.torque",
-            "has no constant cycle time; expected --duration, and neither --skip-cycles nor --trace",
+            "has no constant cycle time. Expected --duration, and neither --skip-cycles nor --trace",
         )
     period = TURN / abs(setup.speed) if setup.speed else math.inf
     counted = cycles * period if duration_s is None else duration_s
@@ -457,7 +457,7 @@ def _run(
         report(t / (skipped + counted))
     if not statistics.time[0] > 0.0:
         raise ConfigError(
-            "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
+            "duration", "", f"{counted:g} s is too short for this model. Expected more, or model full"
         )
     turned = math.copysign(counted / period, setup.speed)
     if not is_steady:

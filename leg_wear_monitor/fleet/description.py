@@ -125,7 +125,7 @@ def _name_fault(name: str) -> str | None:
 
 def _patterns_fault(patterns: Patterns) -> str | None:
     """Why these patterns cannot be used; None if they can."""
-    return None if patterns and all(listed(patterns)) else "has an empty pattern, expected files"
+    return None if patterns and all(listed(patterns)) else "has an empty pattern. Expected files"
 
 
 def listed(patterns: Patterns) -> tuple[str, ...]:
@@ -170,7 +170,7 @@ class FleetFile:
     defaults: Defaults = described("values for legs without their own values", factory=Defaults)
     out: str = described("directory of the fleet; a command may name its own", default="fleet")
     legs: tuple[LegEntry, ...] = described(
-        "the legs", check=lambda legs: None if legs else "is empty, expected at least one leg"
+        "the legs", check=lambda legs: None if legs else "is empty. Expected at least one leg"
     )
 
 

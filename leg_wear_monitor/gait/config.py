@@ -55,7 +55,7 @@ class PaceConfig:
 
     def __attrs_post_init__(self) -> None:
         if len(self.speeds_rpm) != len(self.times_s):
-            fault = f"has {len(self.speeds_rpm)} speeds for {len(self.times_s)} times, expected one each"
+            fault = f"has {len(self.speeds_rpm)} speeds for {len(self.times_s)} times. Expected one each"
             raise FieldError("speeds_rpm", fault)
         if any(b - a < self.ramp_s for a, b in pairwise(self.times_s)):
             raise FieldError("ramp_s", f"{self.ramp_s!r} s is longer than the time between two speeds")
@@ -96,7 +96,7 @@ class JointEncodersConfig:
         for key in ("joints", "offsets_rad", "scale_errors"):
             given = len(getattr(self, key))
             if given != len(self.names) and (given or key == "joints"):
-                fault = f"has {given} values for {len(self.names)} encoders, expected one each"
+                fault = f"has {given} values for {len(self.names)} encoders. Expected one each"
                 raise FieldError(key, fault)
 
 

@@ -324,7 +324,7 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     contacts = setup.contacts
     clearance = np.array(config.clearances_m) if config.clearances_m else contacts.clearance
     if len(clearance) != len(setup.clearance_joints):
-        fault = f"has {len(clearance)} values, expected one each for {', '.join(setup.clearance_joints)}"
+        fault = f"has {len(clearance)} values. Expected one each for {', '.join(setup.clearance_joints)}"
         raise ConfigError("gait", "clearances_m", fault)
     wear = contacts.wear_coefficient * config.wear_acceleration
     return attrs.evolve(

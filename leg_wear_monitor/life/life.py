@@ -84,8 +84,8 @@ def check_life(
         raise ConfigError(
             "max-wear-per-jump-m",
             "",
-            f"{jump.max_wear_per_jump_m:g} m per jump takes {jumps:.2g} jumps to the limit, "
-            f"expected at most {MOST_JUMPS}",
+            f"{jump.max_wear_per_jump_m:g} m per jump takes {jumps:.2g} jumps to the limit. "
+            f"Expected at most {MOST_JUMPS}",
         )
 
 

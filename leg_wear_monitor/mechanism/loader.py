@@ -56,7 +56,7 @@ def check_references(mechanism: Mechanism) -> None:
             raise ConfigError(
                 mechanism.source,
                 f"assembly.{body}",
-                "is missing, expected: the body's origin and angle, [x, y, angle] [m, m, rad]",
+                "is missing. Expected: the body's origin and angle, [x, y, angle] [m, m, rad]",
             )
 
 
@@ -69,14 +69,14 @@ def _check_joints(mechanism: Mechanism) -> None:
             _need_point(mechanism, body, name, key, key)
         if sides[0] == sides[1]:
             raise ConfigError(
-                mechanism.source, f"joints.{name}", f"joins {sides[0]!r} to itself, expected two bodies"
+                mechanism.source, f"joints.{name}", f"joins {sides[0]!r} to itself. Expected two bodies"
             )
 
 
 def _need_point(mechanism: Mechanism, body: str, point: str, body_key: str, point_key: str) -> None:
     if body != GROUND and body not in mechanism.bodies:
         bodies = ", ".join([GROUND, *mechanism.bodies])
-        raise ConfigError(mechanism.source, body_key, f"{body!r} is not a body, expected one of {bodies}")
+        raise ConfigError(mechanism.source, body_key, f"{body!r} is not a body. Expected one of {bodies}")
     if point not in mechanism.points_of(body):
         points = ", ".join(mechanism.points_of(body)) or "none"
         raise ConfigError(
@@ -87,7 +87,7 @@ def _need_point(mechanism: Mechanism, body: str, point: str, body_key: str, poin
 def _need_moving(mechanism: Mechanism, body: str, key: str) -> None:
     if body not in mechanism.bodies:
         bodies = ", ".join(mechanism.bodies)
-        raise ConfigError(mechanism.source, key, f"{body!r} is not a moving body, expected one of {bodies}")
+        raise ConfigError(mechanism.source, key, f"{body!r} is not a moving body. Expected one of {bodies}")
 
 
 # Summary of a mechanism in everyday units, so that a wrong unit is obvious.
@@ -304,7 +304,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
         raise ConfigError(
             str(name_or_path),
             "",
-            f"no mechanism of this name, expected a file such as ./leg.yaml or one of {', '.join(shipped)}"
+            f"no mechanism of this name. Expected a file such as ./leg.yaml or one of {', '.join(shipped)}"
             + did_you_mean(path.name, shipped),
         )
     path = shipped[path.name]
@@ -354,8 +354,8 @@ def _drive_class(entry: Any) -> tuple[type, Any]:
     if len(given) != 1:
         raise FieldError(
             "",
-            f"has {' and '.join(given) or 'none of them'}, "
-            "expected one of speed [rad/s], torque [N m], track",
+            f"has {' and '.join(given) or 'none of them'}. "
+            "Expected one of speed [rad/s], torque [N m], track",
         )
     return _DRIVES[given[0]], entry
 
@@ -366,7 +366,7 @@ def _torques(entry: Any) -> tuple[Any, Any]:
 
 def _label(entry: Any) -> tuple[Any, Any]:
     if entry is None or entry == "":
-        raise FieldError("", "is empty, expected a name such as knee, or no label")
+        raise FieldError("", "is empty. Expected a name such as knee, or no label")
     return str, entry
 
 

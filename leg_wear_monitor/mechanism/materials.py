@@ -335,8 +335,8 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
         raise ConfigError(
             mechanism.source,
             f"clearances.joints.{joints[0]}.wear_coefficient",
-            f"is missing for a life: {known[0].material} has no wear coefficient of both bodies, "
-            "expected one next to the material [1/Pa]",
+            f"is missing for a life: {known[0].material} has no wear coefficient of both bodies. "
+            "Expected one next to the material [1/Pa]",
         )
 
 

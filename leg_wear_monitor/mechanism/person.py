@@ -234,11 +234,11 @@ def read_toe_force(path: Path) -> Floats:
         raise ConfigError(str(path), _OF_FORCE[0], fault)
     widest = max(float(np.abs(way).max()), TURN - float(np.ptp(angle)))
     if widest > TURN / _LEAST_ROWS:
-        fault = f"no rows over {widest:.3g} rad of the turn, expected at most {TURN / _LEAST_ROWS:.2g} rad"
+        fault = f"no rows over {widest:.3g} rad of the turn. Expected at most {TURN / _LEAST_ROWS:.2g} rad"
         raise ConfigError(str(path), _OF_FORCE[0], fault)
     peak_n, (least_n, most_n) = float(up.max()), USUAL_PEAK_N
     if peak_n <= -float(up.min()):
-        fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least, expected a ground that pushes up"
+        fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least. Expected a ground that pushes up"
         raise ConfigError(str(path), _OF_FORCE[1], fault)
     if not least_n <= peak_n <= most_n:
         fault = f"{peak_n:.3g} N at most, usual are {least_n:g} to {most_n:g} N; a unit other than N?"

@@ -81,7 +81,7 @@ def build_linkage(mechanism: Mechanism) -> Linkage:
         bodies, joints = len(mechanism.bodies), len(mechanism.joints)
         raise AssemblyError(
             f"{mechanism.source}: joints: mobility is {freedom} "
-            f"(3 x {bodies} bodies - 2 x {joints} joints), expected 1"
+            f"(3 x {bodies} bodies - 2 x {joints} joints). Expected 1"
         )
     arrays = compile_arrays(mechanism)
     return Linkage(mechanism, arrays, select_rows(arrays, range(len(mechanism.joints)), driven=True))
@@ -167,7 +167,7 @@ def far_from_start(linkage: Linkage, q: Floats) -> str:
     body = list(linkage.mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
     return (
         f"{body}: no assembly near the given start: the one found moves this body "
-        f"by {moved.max():.2g} (rad or link lengths), expected at most {_FAR}"
+        f"by {moved.max():.2g} (rad or link lengths). Expected at most {_FAR}"
     )
 
 

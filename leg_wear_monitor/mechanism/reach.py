@@ -345,7 +345,7 @@ def _closes_between(
 def headline(reach: Reach) -> str:
     """In a few words, whether the mechanism works."""
     if reach.mobility != 1:
-        return f"mobility is {reach.mobility}, expected 1"
+        return f"mobility is {reach.mobility}. Expected 1"
     if reach.open_joint:
         return f"does not close: {gap_words(reach, 0)}"
     if not reach.turns:
@@ -404,7 +404,7 @@ def _mobility(reach: Reach) -> list[str]:
     bodies, joints = len(reach.mechanism.bodies), len(reach.mechanism.joints)
     sum_ = f"3 x {bodies} bodies - 2 x {joints} joints"
     more = "a joint is missing" if reach.mobility > 1 else "a joint is too many, or a body is missing"
-    return [f"joints: mobility is {reach.mobility} ({sum_}), expected 1: {more}"]
+    return [f"joints: mobility is {reach.mobility} ({sum_}). Expected 1: {more}"]
 
 
 def _open_words(reach: Reach) -> list[str]:

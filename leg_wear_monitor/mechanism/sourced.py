@@ -80,7 +80,7 @@ UNITS = {
 
 
 def _blank(text: str) -> str | None:
-    return None if text.strip() else "is empty, expected a text"
+    return None if text.strip() else "is empty. Expected a text"
 
 
 def _interval(interval: tuple[float, float]) -> str | None:
@@ -103,7 +103,7 @@ class SourcedValue:
         if self.unit not in UNITS:
             raise FieldError("unit", f"{self.unit!r} is not one of {', '.join(UNITS)}")
         if self.value is None and self.range is None:
-            raise FieldError("value", "is missing, and so is range, expected one of them")
+            raise FieldError("value", "is missing, and so is range. Expected one of them")
 
     @property
     def central(self) -> float:
@@ -147,7 +147,7 @@ class WearCoefficient(SourcedValue):
         super().__attrs_post_init__()
         needs = UNITS[self.unit].needs_hardness
         if needs and self.hardness is None:
-            raise FieldError("hardness", f"is missing, expected the hardness H of {self.unit}")
+            raise FieldError("hardness", f"is missing. Expected the hardness H of {self.unit}")
         if not needs and self.hardness is not None:
             raise FieldError("hardness", f"does not belong to a coefficient in {self.unit}")
 
@@ -162,7 +162,7 @@ def unit_fault(dimension: str, value: SourcedValue) -> str | None:
     """Fault of the unit or the sign of a value with this dimension; None if there is none."""
     if UNITS[value.unit].dimension != dimension:
         known = " or ".join(name for name, unit in UNITS.items() if unit.dimension == dimension)
-        return f"unit {value.unit!r} is not one of {dimension}, expected {known}"
+        return f"unit {value.unit!r} is not one of {dimension}. Expected {known}"
     if dimension != "temperature" and not (value.central > 0.0 and min(value.range or (0.0,)) >= 0.0):
         return f"{value.central!r} {value.unit} is not above 0"
     return None
@@ -236,7 +236,7 @@ class Drive(SourcedFile):
 
     def __attrs_post_init__(self) -> None:
         if self.shaft == MOTOR and self.gear_ratio is None:
-            fault = "is missing, expected the turns of the motor per turn of the output for shaft: motor"
+            fault = "is missing. Expected the turns of the motor per turn of the output for shaft: motor"
             raise FieldError("gear_ratio", fault)
         if self.load_friction is not None and not self.load_friction.si < 1.0:
             raise FieldError("load_friction", f"{self.load_friction.si!r} is not below 1")

@@ -155,10 +155,10 @@ _IN_LABELS = " ',-./+"  # with letters and digits: nothing that a page or a term
 
 def _label_fault(label: str) -> str | None:
     if len(label) > _LONGEST_LABEL:
-        return f"has {len(label)} characters, expected at most {_LONGEST_LABEL}"
+        return f"has {len(label)} characters. Expected at most {_LONGEST_LABEL}"
     if all(sign.isalnum() or sign in _IN_LABELS for sign in label) and label == label.strip():
         return None
-    return f"{label!r} is not a plain name, expected letters, digits, spaces between and {_IN_LABELS.strip()}"
+    return f"{label!r} is not a plain name. Expected letters, digits, spaces between and {_IN_LABELS.strip()}"
 
 
 def _label() -> Any:
@@ -194,7 +194,7 @@ def _turns(speed: float) -> str | None:
     least, most = 1.0e-3, 1.0e4
     if least <= abs(speed) <= most:
         return None
-    return f"{speed!r} rad/s does not turn the crank, expected a speed from {least:g} to {most:g} rad/s"
+    return f"{speed!r} rad/s does not turn the crank. Expected a speed from {least:g} to {most:g} rad/s"
 
 
 def _rises_below_one(phase: tuple[float, ...]) -> str | None:
@@ -256,7 +256,7 @@ class Track:
         torques, phases = len(self.feed_forward_nm), len(self.feed_forward_phase)
         if torques != phases:
             raise FieldError(
-                "feed_forward_nm", f"has {torques} torques for {phases} phases, expected one each"
+                "feed_forward_nm", f"has {torques} torques for {phases} phases. Expected one each"
             )
 
 
@@ -305,7 +305,7 @@ class PhaseLoad:
     def __attrs_post_init__(self) -> None:
         if len(self.force) != len(self.phase):
             raise FieldError(
-                "force", f"has {len(self.force)} forces for {len(self.phase)} phases, expected one each"
+                "force", f"has {len(self.force)} forces for {len(self.phase)} phases. Expected one each"
             )
 
 
@@ -380,7 +380,7 @@ class Mechanism:
             return found[0]
         known = [*labels, *filter(None, labels.values())]
         expected = ", ".join(labels)
-        fault = f"{name!r} is not a clearance joint, expected one of {expected}{did_you_mean(name, known)}"
+        fault = f"{name!r} is not a clearance joint. Expected one of {expected}{did_you_mean(name, known)}"
         raise ConfigError("JOINT", "", fault)
 
     def with_toe(self, name: str) -> "Mechanism":
@@ -394,7 +394,7 @@ class Mechanism:
         body, _, point = name.partition(".")
         if body not in self.bodies or point not in self.bodies[body].points:
             known = [f"{one}.{each}" for one, spec in self.bodies.items() for each in spec.points]
-            fault = f"{name!r} is not a point of a body, expected one of {', '.join(known)}"
+            fault = f"{name!r} is not a point of a body. Expected one of {', '.join(known)}"
             raise ConfigError("toe", "", fault)
         return attrs.evolve(self, toe_point=(body, point))
 

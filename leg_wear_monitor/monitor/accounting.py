@@ -270,7 +270,7 @@ class Accounting:
     def _index(self, joint: str) -> int:
         if joint not in self._twin.clearance_joints:
             raise LegWearError(
-                f"{joint}: no clearance joint, expected one of {', '.join(self._twin.clearance_joints)}"
+                f"{joint}: no clearance joint. Expected one of {', '.join(self._twin.clearance_joints)}"
             )
         return self._twin.clearance_joints.index(joint)
 

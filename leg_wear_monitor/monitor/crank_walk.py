@@ -174,7 +174,7 @@ def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
     if not found:
         return "there is no drive torque"
     if found < _LEAST_SAMPLES * walk.turns:
-        return f"the drive torque has {found} samples in {walk.turns} turns, expected {_LEAST_SAMPLES} a turn"
+        return f"the drive torque has {found} samples in {walk.turns} turns. Expected {_LEAST_SAMPLES} a turn"
     pair = paired(motion_of(walk.crank), walk.torque)
     if len(pair.torque) < _LEAST_SAMPLES or not float(pair.torque.std()) > 0.0:
         return "the drive torque does not change"
@@ -240,7 +240,7 @@ def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
         )
     if best.sigma["offset_rad"] > _SURE_RAD:
         return (
-            f"it is known to ± {best.sigma['offset_rad']:.2g} rad, expected {_SURE_RAD:g} rad: the drive "
+            f"it is known to ± {best.sigma['offset_rad']:.2g} rad. Expected {_SURE_RAD:g} rad: the drive "
             "torque scatters"
         )
     return ""

@@ -175,7 +175,7 @@ def _other_cadence(leg: MonitoredLeg) -> tuple[str, ...]:
     if leg.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
         return ()
     rpm, commanded = leg.twin.speed_radps * 30.0 / math.pi, cadence.commanded_rpm
-    return (f"it walks at {rpm:.3g} rpm, expected {commanded:g} ± {cadence.tolerance_rpm:g} rpm",)
+    return (f"it walks at {rpm:.3g} rpm. Expected {commanded:g} ± {cadence.tolerance_rpm:g} rpm",)
 
 
 def _doubts(leg: MonitoredLeg) -> tuple[str, ...]:

@@ -115,7 +115,7 @@ class WearMonitor:
         config = MonitorConfig() if config is None else config
         for name, given, kind in (("mechanism", mechanism, Mechanism), ("config", config, MonitorConfig)):
             if not isinstance(given, kind):
-                fault = f"{shown(given)} is not a {kind.__name__}, expected the result of load_{name}"
+                fault = f"{shown(given)} is not a {kind.__name__}. Expected the result of load_{name}"
                 raise ConfigError(name, "", fault)
         self._leg = leg = MonitoredLeg(mechanism, config, ledger)
         self.mechanism, self.clearance_joints = leg.mechanism, leg.clearance_joints

@@ -126,7 +126,7 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
             found = _directory(path, findings) if path.is_dir() else [_file(path)]
         files += [attrs.evolve(file, recording=number) for file in found]
     if not files:
-        raise RecordingError("", "", f"no recording given, expected {_EXPECTED}")
+        raise RecordingError("", "", f"no recording given. Expected {_EXPECTED}")
     return files, findings
 
 
@@ -266,9 +266,9 @@ def check_channel(stream: Stream, channel: Channel, where: str) -> None:
     """
     kind = channel.type or stream.type
     if kind != stream.type:
-        raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
+        raise RecordingError(where, channel.topic, f"is of type {kind}. Expected {stream.type}")
     if channel.encoding != "cdr":
-        raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
+        raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}. Expected 'cdr'")
 
 
 # Uniform access to the files of a recording, and selection of the channels to read.

@@ -221,7 +221,7 @@ class McapFile:
             check_size(len(chunk.data) + max(size, chunk.uncompressed_size))
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
             if length != chunk.uncompressed_size:
-                raise DamageError(f"contains {length} bytes, expected {chunk.uncompressed_size}")
+                raise DamageError(f"contains {length} bytes. Expected {chunk.uncompressed_size}")
             return stream.read(length)
         except _UNREADABLE as error:
             raise DamageError(f"cannot be read: {one_line(error)}") from error

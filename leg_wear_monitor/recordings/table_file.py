@@ -194,7 +194,7 @@ class Table:
 
     def _array(self, name: str, values: Any) -> Any:
         if len(shape := np.shape(values)) != 1:
-            fault = f"column {name!r} has the shape {shape}, expected one number a row"
+            fault = f"column {name!r} has the shape {shape}. Expected one number a row"
             raise RecordingError(str(self.path), "", fault)
         try:
             return pa.array(values, from_pandas=True)
@@ -235,10 +235,10 @@ class CsvTable(Table):
             start = start[: start.rfind(b"\n") + 1]
         if not start.strip():
             raise RecordingError(
-                str(self.path), "", "is empty, expected a line with the names of the columns"
+                str(self.path), "", "is empty. Expected a line with the names of the columns"
             )
         if b"\0" in start:  # as in UTF-16
-            raise RecordingError(str(self.path), "", "is not a text in UTF-8, expected a CSV file in UTF-8")
+            raise RecordingError(str(self.path), "", "is not a text in UTF-8. Expected a CSV file in UTF-8")
         self._encoding = "utf8"
         try:
             lines = start.decode("utf-8-sig")
@@ -256,7 +256,7 @@ class CsvTable(Table):
                 more = row.actual_columns > row.expected_columns and self.head.separator == ","
                 hint = "; decimal commas?" if more else ""
                 self.lose_row(
-                    row.number, f"{row.actual_columns} cells, expected {row.expected_columns}{hint}"
+                    row.number, f"{row.actual_columns} cells. Expected {row.expected_columns}{hint}"
                 )
             return "skip"
 
@@ -436,7 +436,7 @@ def _checked(table: Table, column: Column, array: Any) -> Any:
         fits = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)
     if not fits:
         what = f"dates, as table.units.stamp is {DATE!r}" if is_date else f"numbers in {column.unit}"
-        fault = f"column {column.name!r} is of type {kind}, expected {what}"
+        fault = f"column {column.name!r} is of type {kind}. Expected {what}"
         raise RecordingError(str(table.path), column.parameter, fault)
     return array
 

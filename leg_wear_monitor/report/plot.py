@@ -85,7 +85,7 @@ def plot(result: Any, axes: Axes | None = None, **of_simulation: str) -> Axes:
     'force [N]'
     """
     raise TypeError(
-        f"{type(result).__name__} has no picture, expected SimulationResult, Life, ReplaySummary or Mechanism"
+        f"{type(result).__name__} has no picture. Expected SimulationResult, Life, ReplaySummary or Mechanism"
     )
 
 
@@ -113,7 +113,7 @@ def _simulation(
     name = joint or next(iter(result.clearance_joints), "")
     if name not in result.clearance_joints:
         known = ", ".join(result.clearance_joints) or "none, the leg is ideal"
-        raise ConfigError("joint", "", f"{name!r} has no clearance, expected one of: {known}")
+        raise ConfigError("joint", "", f"{name!r} has no clearance. Expected one of: {known}")
     if kind == "wear":
         return _wear(result, name, _new(projection="polar") if axes is None else axes)
     return _plane(_trace(result), name, kind, _new() if axes is None else axes)
@@ -121,7 +121,7 @@ def _simulation(
 
 def _trace(result: SimulationResult) -> Trace:
     if result.trace is None:
-        raise ConfigError("trace", "", "the result has no trace, expected a simulation with trace=N")
+        raise ConfigError("trace", "", "the result has no trace. Expected a simulation with trace=N")
     return result.trace
 
 
@@ -142,7 +142,7 @@ def _column(trace: Trace, kind: str, axes: Axes) -> Axes:
     field, factor, label = _OF_TRACE[kind]
     values = getattr(trace, field)
     if values is None:
-        raise ConfigError("kind", "", f"the result has no {kind} error, expected a toe and a steady crank")
+        raise ConfigError("kind", "", f"the result has no {kind} error. Expected a toe and a steady crank")
     size = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
     axes.plot(trace.crank_angle_rad / TURN, factor * size, color=BLUE, linewidth=0.7)
     return _finished(axes, _TURNS, label)

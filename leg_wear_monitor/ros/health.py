@@ -383,7 +383,7 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
         yield Level.ERROR, topic.other_axis
     if len(topic.publishers.fitting) - topic.shared > 1 and (several_of := several(topic.publishers)):
         at = Level.ERROR if topic.sources > 1 else Level.WARN
-        yield at, f"{several_of}; expected one"
+        yield at, f"{several_of}. Expected one"
 
 
 def recording_status(black_box: BlackBox) -> Status:

@@ -286,7 +286,7 @@ def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Pub
 def _refusal(publisher: TopicEndpointInfo, expected: str, qos: QoSProfile) -> str:
     """Why no message of a publisher arrives; empty if they do."""
     if publisher.topic_type != expected:
-        return f"publishes {publisher.topic_type}, expected {expected}"
+        return f"publishes {publisher.topic_type}. Expected {expected}"
     compatibility, why = qos_check_compatible(publisher.qos_profile, qos)
     if compatibility != QoSCompatibility.ERROR:
         return ""
@@ -335,7 +335,7 @@ def check_stamps(config: MonitorConfig, source: str) -> None:
         if not stream.has_stamp:
             key, stamped = ("foot_load", "wrench") if stream.kind == LOAD else ("drive_torque", _STAMPED)
             fault = (
-                f"the messages of {stream.source} have no stamp, which use_sim_time needs, expected {stamped}"
+                f"the messages of {stream.source} have no stamp, which use_sim_time needs. Expected {stamped}"
             )
             raise ConfigError(source, f"{key}.source", fault)
 

@@ -55,14 +55,14 @@ def request_of(parameters: Sequence[Parameter]) -> dict[str, Any]:
     for one in parameters:
         if one.name not in _WANTED:
             names = ", ".join(_WANTED)
-            fault = f"unknown parameter, expected {names}{did_you_mean(one.name, _WANTED)}"
+            fault = f"unknown parameter. Expected {names}{did_you_mean(one.name, _WANTED)}"
             raise ConfigError(printable(one.name, 100), "", fault)
         if one.name in values:
             raise ConfigError(one.name, "", "is given twice")
         values[one.name] = _value(one)
     for name, (kind, meaning) in _WANTED.items():
         if name not in values and name not in _OPTIONAL:
-            raise ConfigError(name, "", f"is missing, expected a {kind}: {meaning}")
+            raise ConfigError(name, "", f"is missing. Expected a {kind}: {meaning}")
     return values
 
 
@@ -70,7 +70,7 @@ def _value(one: Parameter) -> Any:
     kind, meaning = _WANTED[one.name]
     found, field = _TYPES.get(one.value.type, ("other", ""))
     if found != kind:
-        raise ConfigError(one.name, "", f"is of type {found}, expected a {kind}: {meaning}")
+        raise ConfigError(one.name, "", f"is of type {found}. Expected a {kind}: {meaning}")
     return getattr(one.value, field)
 
 

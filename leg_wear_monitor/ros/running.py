@@ -158,7 +158,7 @@ def _init(argv: list[str]) -> None:
     except (RuntimeError, _rclpy.RCLInvalidROSArgsError) as error:
         raise ConfigError(argv[0], "", str(error).split(", at /")[0]) from error
     if stray:
-        raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
+        raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}. Expected --ros-args ...")
 
 
 def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:

@@ -104,7 +104,7 @@ def _write_manifest(study: Study, keys: list[str], out: Path) -> None:
     if (out / MANIFEST).exists():
         present = _read_manifest(out)["settings"]["title"]
         if present != study.title:
-            fault = f"contains the study {present!r}, expected {study.title!r} or a new directory"
+            fault = f"contains the study {present!r}. Expected {study.title!r} or a new directory"
             raise ConfigError(str(out), "", fault)
     is_file = is_file_name(study.mechanism)
     source = Path(study.mechanism) if is_file else shipped_mechanisms()[study.mechanism]
@@ -177,7 +177,7 @@ def load_results(directory: Path) -> StudyResults:
     study = parse_study(manifest["settings"], f"{directory / MANIFEST}: settings")
     points, keys = study.points(), manifest["keys"]
     if len(keys) != len(points):
-        raise ConfigError(str(directory / MANIFEST), "keys", f"has {len(keys)} keys, expected {len(points)}")
+        raise ConfigError(str(directory / MANIFEST), "keys", f"has {len(keys)} keys. Expected {len(points)}")
     return StudyResults(
         settings=study,
         mechanism=parse_mechanism(read_yaml(source, str(source)), str(source)),

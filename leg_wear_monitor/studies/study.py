@@ -168,7 +168,7 @@ class Sweep:
 
     def __attrs_post_init__(self) -> None:
         if len(self.varied) > 1:
-            raise FieldError("", f"varies {' and '.join(self.varied)}, expected one setting per sweep")
+            raise FieldError("", f"varies {' and '.join(self.varied)}. Expected one setting per sweep")
 
     @property
     def varied(self) -> list[str]:

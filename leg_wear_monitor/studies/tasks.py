@@ -189,7 +189,7 @@ def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
     legs = [ensemble(mechanism, each | {"runs": 1})[0] for each in settings]
     for leg in {repr(leg): leg for leg in legs}.values():
         if not leg.clearances:
-            raise ConfigError("clearances", "", "a point has no clearance joint, expected at least one")
+            raise ConfigError("clearances", "", "a point has no clearance joint. Expected at least one")
         leg.prepare()
 
 

@@ -83,7 +83,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
             raise ConfigError(
                 mechanism.source,
                 "joints",
-                f"{name!r} is not a revolute joint, expected some of {', '.join(ready)}",
+                f"{name!r} is not a revolute joint. Expected some of {', '.join(ready)}",
             )
     linkage = build_linkage(mechanism)
     contacts = compile_contacts(

@@ -209,7 +209,7 @@ class DigitalTwin:
         """
         if joint not in self.clearance_joints:
             raise LegWearError(
-                f"{joint}: no clearance joint, expected one of {', '.join(self.clearance_joints)}"
+                f"{joint}: no clearance joint. Expected one of {', '.join(self.clearance_joints)}"
             )
         depth = self.depth
         depth[self.clearance_joints.index(joint)] = 0.0

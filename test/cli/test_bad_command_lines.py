@@ -55,7 +55,7 @@ def test_a_wrong_command_line_is_one_line(refused, line, said):
     ("option", "target", "said"),
     [
         ("--json", "nowhere/result.json", "cannot be written: No such file"),
-        ("--json", ".", "is a directory, expected a file"),
+        ("--json", ".", "is a directory. Expected a file"),
         ("--json", "file/result.json", "cannot be written: Not a directory"),
         ("--json", "/proc/result.json", "cannot be written"),
         ("--out", "file", "cannot be written: Not a directory"),

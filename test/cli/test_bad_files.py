@@ -23,7 +23,7 @@ BROKEN = [
     ("G: [0.420, 0.0]", "G: [0.420, left]", ["bodies.thigh.points.G", "'left'", "number [m]"]),
     ("[0.086, 0.0, -1.740340]", "[0.086, 0.0]", ["assembly.coupler", "3 numbers [m, m, rad]"]),
     ("gravity: [0.0, -9.81]", "gravity: down", ["gravity", "'down'", "2 numbers [m/s^2]"]),
-    ("speed: 6.283185307179586", "speed: 0", ["drive.speed", "0.0 rad/s", "expected a speed"]),
+    ("speed: 6.283185307179586", "speed: 0", ["drive.speed", "0.0 rad/s", "Expected a speed"]),
     ("restitution: 0.9", "restitution: 1.9", ["clearances.defaults.restitution", "1.9", "at most 1"]),
     ("restitution: 0.9", "restitution: 0.01", ["clearances.defaults.restitution", "0.01", "at least 0.02"]),
     ("[0.29, 0.29]", "[0.29, 0.79]", ["clearances.defaults.poissons_ratio", "0.79", "at most 0.5"]),
@@ -53,7 +53,7 @@ BROKEN = [
     (JOINT, "A: {bushing: ground, kind: ball,", ["joints.A.kind", "'ball'", "revolute, prismatic"]),
     ("body: crank", "body: ground", ["drive.body", "'ground'", "not a moving body", "crank, thigh"]),
     ("speed: 6.283185307179586", "", ["drive", "speed [rad/s], torque [N m]"]),
-    ("speed: 6.28", "torque: 1, speed: 6.28", ["drive", "speed and torque", "expected one of"]),
+    ("speed: 6.28", "torque: 1, speed: 6.28", ["drive", "speed and torque", "Expected one of"]),
     (CRANK_POSE, "", ["assembly.crank", "missing", "[m, m, rad]"]),
     (CRANK_POSE, CRANK_POSE + "  arm: [0, 0, 0]\n", ["assembly.arm", "'arm'", "not a moving body"]),
     ("[A, B, G, I, J]", "[A, Q]", ["clearances.joints.Q", "not a joint", "A, B, C"]),
@@ -70,7 +70,7 @@ BROKEN = [
     ("name: bionic_leg", "name: \x07", ["not YAML", "#x0007"]),
     ("bodies:", "bodies: 7\nrest:", ["rest", "unknown key"]),
     # a linkage that cannot be, or cannot turn
-    ("  F: {bushing: shank, journal: coupler}", "  #", ["joints", "mobility is 3", "expected 1"]),
+    ("  F: {bushing: shank, journal: coupler}", "  #", ["joints", "mobility is 3", "Expected 1"]),
     ("D: [0.356, 0.0]", "D: [0.056, 0.0]", ["assembly", "joint", "open by", "mm"]),
     ("C: [0.086, 0.0]", "C: [0.286, 0.0]", ["leg.yaml"]),
 ]

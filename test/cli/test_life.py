@@ -96,9 +96,9 @@ def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
         ("--limit-m 0.6", "0.008 m, the radius of its bushing; did you mean 0.0006 m (0.6 mm)?"),
         (
             "--max-wear-per-jump-m 1e-15",
-            "--max-wear-per-jump-m: 1e-15 m per jump takes 4e+11 jumps to the limit, expected at most 10000",
+            "--max-wear-per-jump-m: 1e-15 m per jump takes 4e+11 jumps to the limit. Expected at most 10000",
         ),
-        ("--duty 300", "--duty: '300' is not N:hours a day, expected such as 0:2,300:5,600:1"),
+        ("--duty 300", "--duty: '300' is not N:hours a day. Expected such as 0:2,300:5,600:1"),
     ],
 )
 def test_a_life_that_would_not_end_is_refused_before_it_begins(run, monkeypatch, options, said):

@@ -60,12 +60,12 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (("Z", "0.4", "--sigma", "0.01"), "'Z' is not a clearance joint, expected one of A, B, G, I, J"),
+        (("Z", "0.4", "--sigma", "0.01"), "'Z' is not a clearance joint. Expected one of A, B, G, I, J"),
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0.0 is not in the range x>0.0"),
         (("A", "0,4", "--sigma", "0.01"), "'0,4' is not a valid float range"),
         (("A", "0.4", "--sigma", "0,01"), "'--sigma': '0,01' is not a valid float range"),
-        (("a", "0.4", "--sigma", "0.01"), "expected one of A, B, G, I, J; did you mean A?"),
+        (("a", "0.4", "--sigma", "0.01"), "Expected one of A, B, G, I, J; did you mean A?"),
         (("A", "0.00042", "--sigma", "0.005"), "mm is not between 0.003 mm, 1 % of the new clearance"),
         (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
         (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),

@@ -72,11 +72,11 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
         (TABLE + "".join(f"{0.5 * i},2,3\n" for i in range(20)), "rows of one gait cycle"),
         (
             TABLE + "".join(f"{0.017 * i},300,0\n" for i in range(36)),
-            "stance.csv: crank_angle: no rows over 5.69 rad of the turn, expected at most 0.57 rad",
+            "stance.csv: crank_angle: no rows over 5.69 rad of the turn. Expected at most 0.57 rad",
         ),
         (
             TABLE + "".join(f"{0.5 * i},{-300 * (i % 2)},0\n" for i in range(13)),
-            "stance.csv: foot_load: 0 N at most and -300 N at least, expected a ground that pushes up",
+            "stance.csv: foot_load: 0 N at most and -300 N at least. Expected a ground that pushes up",
         ),
         ("", "expected at least 12 rows"),
     ],

@@ -123,7 +123,7 @@ def test_a_dry_run_leaves_the_ledger_as_it_is(run, ledger):
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (("g",), "'g' is not a clearance joint, expected one of A, B, G, I, J; did you mean G?"),
+        (("g",), "'g' is not a clearance joint. Expected one of A, B, G, I, J; did you mean G?"),
         (("A", "--undo"), "joint A: the ledger has no reset to undo"),
         ((), "Missing argument 'JOINT'"),
     ],

@@ -286,7 +286,7 @@ def test_a_torque_that_looks_the_same_mirrored_and_noise_are_not_enough_to_tell(
             lambda walk: {name: column[:800] for name, column in attrs.asdict(walk).items()},
             0.1,
             None,
-            r"crank was recorded for \S+ s only, expected at least 10 s",
+            r"crank was recorded for \S+ s only. Expected at least 10 s",
         ),
         (
             lambda walk: {"angle_rad": 0.0 * walk.angle_rad},

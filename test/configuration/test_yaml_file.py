@@ -68,7 +68,7 @@ def test_what_is_no_text_is_one_line(tmp_path, content):
 
 def test_a_device_is_not_read(tmp_path):
     (tmp_path / "zero.yaml").symlink_to("/dev/zero")
-    with pytest.raises(ConfigError, match="is a device, expected a file"):
+    with pytest.raises(ConfigError, match=r"is a device\. Expected a file"):
         load_mechanism(tmp_path / "zero.yaml")
 
 

@@ -64,7 +64,7 @@ def test_a_snippet_arrives_as_it_is_written():
 
 
 def test_a_block_that_would_not_be_run_is_refused():
-    with pytest.raises(ValueError, match="expected sh or python"):
+    with pytest.raises(ValueError, match="Expected sh or python"):
         readme_commands.script("```\nmake all\n```\n")
 
 

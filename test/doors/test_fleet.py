@@ -251,7 +251,7 @@ def test_a_repair_and_a_measurement_show_at_the_next_update(run, fleet, tmp_path
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("legs: []", "legs: is empty, expected at least one leg"),
+        ("legs: []", "legs: is empty. Expected at least one leg"),
         ("legs: [{id: a, recordings: x, lot: y}]", "legs.a.lot: unknown key"),
         ("legs: [{id: a/b, recordings: x}]", "legs.a/b.id: 'a/b' is not a name for a directory"),
         ("legs: [{id: a, recordings: '*.mcap'}, {id: A, recordings: x}]", "legs: the id A is given twice"),

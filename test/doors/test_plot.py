@@ -54,7 +54,7 @@ def test_a_poincare_map_has_one_point_per_gait_cycle() -> None:
     ("how", "said"),
     [
         ({"kind": "phase"}, "kind: 'phase' is not one of force, portrait"),
-        ({"kind": "wear", "joint": "A"}, "joint: 'A' has no clearance, expected one of: G, J"),
+        ({"kind": "wear", "joint": "A"}, "joint: 'A' has no clearance. Expected one of: G, J"),
     ],
 )
 def test_a_wrong_kind_or_joint_is_refused(result, how, said: str) -> None:
@@ -66,4 +66,4 @@ def test_a_wrong_kind_or_joint_is_refused(result, how, said: str) -> None:
 def test_a_picture_of_a_trace_asks_for_one() -> None:
     with pytest.raises(lw.ConfigError) as refused:
         lw.plot(lw.simulate("four_bar", **PART), kind="portrait")
-    assert "expected a simulation with trace=N" in str(refused.value)
+    assert "Expected a simulation with trace=N" in str(refused.value)

@@ -41,7 +41,7 @@ def test_any_point_is_a_toe() -> None:
         ({"friction_coefficient": -1.0}, "friction-coefficient: -1.0 is not at least 0"),
         ({"friction_coefficient": "high"}, "friction-coefficient: 'high' is not a number"),
         ({"restitution": 2.0}, "restitution: 2.0 is not at most 1"),
-        ({"toe": "foot.heel"}, "toe: 'foot.heel' is not a point of a body, expected one of"),
+        ({"toe": "foot.heel"}, "toe: 'foot.heel' is not a point of a body. Expected one of"),
         ({"clearances": [], "friction": "none"}, "friction: is for clearance joints"),
     ],
 )

@@ -177,7 +177,7 @@ def test_a_crank_that_swings_has_no_gait_cycle(leg):
 
 
 def test_a_torque_drive_has_no_cycles():
-    with pytest.raises(ConfigError, match=r"andrews.yaml: drive\.torque: .*expected --duration"):
+    with pytest.raises(ConfigError, match=r"andrews.yaml: drive\.torque: .*Expected --duration"):
         simulate(load_mechanism("andrews"), cycles=1)
 
 
@@ -234,7 +234,7 @@ def test_a_mechanism_can_be_given_by_name_and_by_path(leg, tmp_path):
         ({"skip_cycles": "1"}, "skip-cycles: '1' is not a number"),
         ({"speed_rpm": 0.0}, "does not turn the crank"),
         ({"speed_rpm": "60"}, "speed-rpm: '60' is not a number"),
-        ({"clearances": "AB"}, "clearances: 'AB' is a text, expected a list of names"),
+        ({"clearances": "AB"}, "clearances: 'AB' is a text. Expected a list of names"),
         ({"clearances": 5}, "clearances: 5 is not a list of names"),
         ({"clearances": [1]}, "clearances: 1 is not the name of a joint"),
         ({"clearances": ("A", "A")}, "names a joint twice"),
@@ -246,7 +246,7 @@ def test_a_mechanism_can_be_given_by_name_and_by_path(leg, tmp_path):
         ({"normal_law": 3}, "is not one of hertz"),
         ({"trace": -1}, "trace: -1"),
         ({"trace": 1.5}, "trace: 1.5 is not a whole number"),
-        ({"intervals": 100}, "intervals: 100 is out of bounds, expected 1024 to 65536"),
+        ({"intervals": 100}, "intervals: 100 is out of bounds. Expected 1024 to 65536"),
         ({"intervals": 4096, "model": "full"}, "intervals: 4096 is for model clearance"),
         ({"wear": "off"}, "wear: 'off' is not true or false"),
     ],

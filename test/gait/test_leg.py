@@ -92,7 +92,7 @@ def test_a_knock_opens_one_joint_at_its_time() -> None:
     [
         (
             {"clearances_m": (1e-4,)},
-            "gait: clearances_m: has 1 values, expected one each for A, B, G, I, J",
+            "gait: clearances_m: has 1 values. Expected one each for A, B, G, I, J",
         ),
         ({"knock": KnockConfig(joint="C")}, "gait: knock.joint: 'C' is none of A, B, G, I, J"),
         ({"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),

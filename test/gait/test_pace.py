@@ -66,7 +66,7 @@ def test_the_quintic_passes_through_both_states(
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ({"times_s": (0.0, 1.0)}, "speeds_rpm: has 1 speeds for 2 times, expected one each"),
+        ({"times_s": (0.0, 1.0)}, "speeds_rpm: has 1 speeds for 2 times. Expected one each"),
         ({"times_s": (1.0,)}, "times_s: [1.0] does not increase from 0 s"),
         ({"times_s": (0.0, 0.2), "speeds_rpm": (0.0, 60.0)}, "ramp_s: 0.5 s is longer than"),
         ({"ripple": 1.0}, "ripple: 1.0 is not at most 0.9"),

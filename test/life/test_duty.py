@@ -100,7 +100,7 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("", "'' is not N:hours a day, expected such as 0:2,300:5,600:1"),
+        ("", "'' is not N:hours a day. Expected such as 0:2,300:5,600:1"),
         ("300", "'300' is not N:hours a day"),
         ("0:2,300:x", "'300:x' is not N:hours a day"),
         ("0:2;300:5", "'0:2;300:5' is not N:hours a day"),
@@ -119,7 +119,7 @@ def test_a_duty_that_cannot_be_is_refused(text, fault):
 
 
 def test_a_duty_has_a_load():
-    with pytest.raises(ConfigError, match=r"^duty: has no load, expected such as 0:2,300:5,600:1"):
+    with pytest.raises(ConfigError, match=r"^duty: has no load. Expected such as 0:2,300:5,600:1"):
         lw.Duty({})
 
 

@@ -101,7 +101,7 @@ def test_a_path_starts_at_the_current_directory_and_names_the_file_as_given(tmp_
 def test_a_bare_name_is_not_looked_for_in_the_current_directory(tmp_path, monkeypatch):
     (tmp_path / "mine").write_text(shipped_mechanisms()["four_bar"].read_text())
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match=r"mine: no mechanism of this name, expected .*bionic_leg"):
+    with pytest.raises(ConfigError, match=r"mine: no mechanism of this name. Expected .*bionic_leg"):
         load_mechanism("mine")
 
 
@@ -178,13 +178,13 @@ def test_a_joint_is_called_by_its_name_and_its_label(document):
 @pytest.mark.parametrize(
     ("label", "fault"),
     [
-        (None, "is empty, expected a name such as knee, or no label"),
-        ("", "is empty, expected a name such as knee, or no label"),
+        (None, "is empty. Expected a name such as knee, or no label"),
+        ("", "is empty. Expected a name such as knee, or no label"),
         (7, "7 is not a text on one line"),
         ("a\nb", r"'a\nb' is not a text on one line"),
-        (31 * "x", "has 31 characters, expected at most 30"),
+        (31 * "x", "has 31 characters. Expected at most 30"),
         *(
-            (label, f"{label!r} is not a plain name, expected letters, digits, spaces between and ',-./+")
+            (label, f"{label!r} is not a plain name. Expected letters, digits, spaces between and ',-./+")
             for label in ("<b>knee</b>", "&amp;", "[red]knee", "{{ 7 }}", " knee", "`rm`", "=1")
         ),
     ],

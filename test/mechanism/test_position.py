@@ -59,7 +59,7 @@ def test_dead_point_names_its_crank_angle(document, speed):
 def test_mobility_is_named(document):
     four_bar = document("four_bar")
     del four_bar["joints"]["C"], four_bar["clearances"]
-    with pytest.raises(AssemblyError, match=r"edited\.yaml: joints: mobility is 3 .*expected 1"):
+    with pytest.raises(AssemblyError, match=r"edited\.yaml: joints: mobility is 3 .*Expected 1"):
         _linkage(four_bar)
 
 

@@ -196,7 +196,7 @@ def test_what_cannot_be_used_is_refused_by_name(tmp_path, sent, write_bag, read)
     (note,) = recording.findings
     assert str(note).endswith("it has /joint_states, /motor/torque; select one with --drive-torque")
     config = MonitorConfig(drive_torque=DriveTorque(source="float64"))
-    expected = "/drive_torque: is of type geometry_msgs/msg/WrenchStamped, expected std_msgs/msg/Float64"
+    expected = "/drive_torque: is of type geometry_msgs/msg/WrenchStamped. Expected std_msgs/msg/Float64"
     with pytest.raises(RecordingError, match=expected):
         read(write_bag(tmp_path / "c.mcap", sent), config=config)
 
@@ -224,7 +224,7 @@ def write_as(tmp_path):
 @pytest.mark.parametrize("encoding", ["json", "protobuf", ""])
 def test_other_encodings_are_refused(write_as, read, encoding):
     path = write_as([("/joint_states", 1, b"{}")], encoding, (encode.JOINT_STATE, "jsonschema", b"{}"))
-    with pytest.raises(RecordingError, match=f"/joint_states: is encoded as '{encoding}', expected 'cdr'"):
+    with pytest.raises(RecordingError, match=f"/joint_states: is encoded as '{encoding}'. Expected 'cdr'"):
         read(path)
 
 

@@ -117,7 +117,7 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any) -> None:
     assert 25.0 < node.monitor.state.drive.temperature_c.value < 26.0
     assert status["diagnosis"].values["drive_temperature_c"] == pytest.approx(25.5, abs=0.5)
     topics = {one.name: one for one in node._supervision.statuses(())}["topics"]
-    assert "expected one" not in topics.message
+    assert "Expected one" not in topics.message
     walking.end()
 
 

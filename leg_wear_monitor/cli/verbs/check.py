@@ -92,7 +92,7 @@ def _library(name: str) -> Callable[[], str]:
         try:
             return metadata.version(name)
         except metadata.PackageNotFoundError as error:
-            raise LegWearError(f"{name}: is not installed, expected by leg_wear_monitor") from error
+            raise LegWearError(f"{name}: is not installed. Expected by leg_wear_monitor") from error
 
     return find
 

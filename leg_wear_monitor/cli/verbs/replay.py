@@ -185,7 +185,7 @@ def report(directory: Path) -> int:
     if (directory / common.SUMMARY).is_file():
         return _replay(directory)
     if not (directory / "study.json").is_file():
-        fault = "contains no study.json, expected the --out of a study or of a replay"
+        fault = "contains no study.json. Expected the --out of a study or of a replay"
         raise ConfigError(str(directory), "", fault)
     from leg_wear_monitor.cli.verbs.study import write_study_page
 

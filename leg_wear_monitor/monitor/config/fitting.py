@@ -43,7 +43,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         raise ConfigError(source, "drive.temperature_interface", fault)
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(
-            source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
+            source, "mechanism", f"{config.mechanism!r} is driven by a torque. Expected one with drive.speed"
         )
     if config.load.model != sample.NONE and mechanism.toe is None:
         fault = f"{config.load.model!r} needs a point called toe in {mechanism.source}, which has none"
@@ -124,14 +124,14 @@ def _check_joints(clearance_joints: Sequence[str], mechanism: Mechanism, source:
         raise ConfigError(
             source,
             "clearance_joints",
-            f"none, and {mechanism.source} has none either; expected some of: {_ready(mechanism)}",
+            f"none, and {mechanism.source} has none either. Expected some of: {_ready(mechanism)}",
         )
     for name in clearance_joints:
         if name not in mechanism.clearances:
             raise ConfigError(
                 source,
                 "clearance_joints",
-                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: "
+                f"{name!r} has no clearance settings in {mechanism.source}. Expected some of: "
                 f"{_ready(mechanism)}{did_you_mean(name, mechanism.clearances)}",
             )
     if len(set(clearance_joints)) < len(clearance_joints):
@@ -174,7 +174,7 @@ def _wrong_length(
     return ConfigError(
         source,
         key,
-        f"{list(given)} has {len(given)} values, expected {other}one each for {', '.join(clearance_joints)}",
+        f"{list(given)} has {len(given)} values. Expected {other}one each for {', '.join(clearance_joints)}",
     )
 
 

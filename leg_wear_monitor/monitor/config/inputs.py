@@ -31,7 +31,7 @@ def _is_slow(rpm: float) -> str:
 def _turns(speed: float) -> str | None:
     if abs(speed) >= LEAST_RPM:
         return None
-    return f"{speed!r} rpm does not turn the crank, expected a speed of at least {LEAST_RPM:g} rpm either way"
+    return f"{speed!r} rpm does not turn the crank. Expected a speed of at least {LEAST_RPM:g} rpm either way"
 
 
 def _one_way_or_other(number: float) -> str | None:
@@ -71,17 +71,17 @@ class Crank:
 
     def __attrs_post_init__(self) -> None:
         if self.zero == AT_START and self.offset_rad != 0.0:
-            fault = f"{self.offset_rad!r} rad is not used with crank.zero {AT_START!r}, expected 0.0"
+            fault = f"{self.offset_rad!r} rad is not used with crank.zero {AT_START!r}. Expected 0.0"
             raise FieldError("offset_rad", fault)
 
 
 def _named(name: str) -> str | None:
-    return None if name else "'' is empty, expected a name"
+    return None if name else "'' is empty. Expected a name"
 
 
 def _few_and_different(names: tuple[str, ...]) -> str | None:
     if len(names) > sample.ENCODERS:
-        return f"{list(names)} are {len(names)}, expected at most {sample.ENCODERS}"
+        return f"{list(names)} are {len(names)}. Expected at most {sample.ENCODERS}"
     return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are not different names"
 
 
@@ -120,7 +120,7 @@ class Encoders:
     def __attrs_post_init__(self) -> None:
         for key, given in (("joints", self.joints), ("signs", self.signs)):
             if len(given) != len(self.names) and (given or key == "joints"):
-                fault = f"has {len(given)} values for {len(self.names)} encoders, expected one each"
+                fault = f"has {len(given)} values for {len(self.names)} encoders. Expected one each"
                 raise FieldError(key, fault)
 
 

@@ -184,7 +184,7 @@ def _check_type(parameter: Parameter, value: Any, source: str) -> None:
             raise ConfigError(
                 source,
                 parameter.name,
-                f"{shown(value)} is a whole number to ROS, expected {shown(entry)}.0{unit}",
+                f"{shown(value)} is a whole number to ROS. Expected {shown(entry)}.0{unit}",
             )
 
 
@@ -198,7 +198,7 @@ def _with_bounds(error: ConfigError, known: Mapping[str, Parameter]) -> str:
         or parameter.bounds in error.fault
     ):
         return error.fault
-    return f"{error.fault}, expected {parameter.bounds}"
+    return f"{error.fault}. Expected {parameter.bounds}"
 
 
 # Reads a ROS 2 parameter file without ROS, for replay and check, as the node reads it by --params-file.
@@ -255,9 +255,9 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     Sections for the node are applied in their order, so that later ones prevail.
     """
     if not is_parameter_file(document):
-        raise ConfigError(source, "", f"is not a ROS parameter file, expected '/**: {{{MARK}: ...}}'")
+        raise ConfigError(source, "", f"is not a ROS parameter file. Expected '/**: {{{MARK}: ...}}'")
     if misspelt := _misspelt(document):
-        raise ConfigError(source, misspelt, f"is not a key of ROS, expected {MARK} with two underscores")
+        raise ConfigError(source, misspelt, f"is not a key of ROS. Expected {MARK} with two underscores")
     values: dict[str, Any] = {}
     sections = list(_sections(document))
     node, taken = node or _node_of([name for name, _ in sections]), False

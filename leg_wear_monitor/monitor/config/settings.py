@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.config.tables import TableInput
 
 
 def _filled(text: str) -> str | None:
-    return None if text else "'' is empty, expected a name"
+    return None if text else "'' is empty. Expected a name"
 
 
 @attrs.frozen(kw_only=True)

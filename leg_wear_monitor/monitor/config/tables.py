@@ -39,7 +39,7 @@ FORCES: Mapping[str, tuple[float, float]] = {"newton": (1.0, 1.0), "kN": (1000.0
 
 
 def _filled(name: str) -> str | None:
-    return None if name else "'' is empty, expected the name of a column"
+    return None if name else "'' is empty. Expected the name of a column"
 
 
 @attrs.frozen(kw_only=True)
@@ -91,7 +91,7 @@ def _date(text: str) -> str | None:
     try:
         datetime.fromisoformat(text)
     except ValueError:
-        return f"{text!r} is not a date and time, expected for example '2026-03-01T09:00:00Z'"
+        return f"{text!r} is not a date and time. Expected for example '2026-03-01T09:00:00Z'"
     return None
 
 
@@ -126,7 +126,7 @@ class TableInput:
 
     def __attrs_post_init__(self) -> None:
         if self.units.crank_angle == COUNTS and not self.counts_per_turn:
-            raise FieldError("counts_per_turn", "is missing, expected the counts of the encoder in a turn")
+            raise FieldError("counts_per_turn", "is missing. Expected the counts of the encoder in a turn")
 
     @property
     def angle_scale(self) -> tuple[float, float]:

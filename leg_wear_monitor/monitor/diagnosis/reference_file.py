@@ -140,7 +140,7 @@ def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, 
         raise ConfigError(
             str(path),
             "",
-            f"has torque references of a different leg ({printable(name, 60)}), expected those of "
+            f"has torque references of a different leg ({printable(name, 60)}). Expected those of "
             f"{mechanism.name} with its bodies, lengths, clearance joints and clearances",
         )
     return found
@@ -154,7 +154,7 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
         with np.load(path, allow_pickle=False) as parts:
             number = int(parts["format"])
             if number != FORMAT:
-                raise ValueError(f"format {number}, expected {FORMAT}")
+                raise ValueError(f"format {number}. Expected {FORMAT}")
             name, joints = str(parts["mechanism"]), tuple(parts["joints"].tolist())
             # clearances are in the order of the joints, which the fingerprint leaves open
             if str(parts["fingerprint"]) != fingerprint(mechanism) or joints != mechanism.clearance_joints:

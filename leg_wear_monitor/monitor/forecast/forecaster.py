@@ -92,7 +92,7 @@ def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     lives = f"the lives of {given}" if given else "the lives of this leg that come with the package"
     text = (
         f"{lives} end at {1e3 * ends_m:.3g} mm, below the limit of joint {joint}, "
-        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond, expected lives from "
+        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond. Expected lives from "
         f"`leg-wear-monitor life --limit-m {limits[joint]:g}`"
     )
     return (Doubt("forecast.growth_law_file", text),)
@@ -135,14 +135,14 @@ def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequ
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         joints = ", ".join(mechanism.clearance_joints)
         raise ConfigError(
-            path, "", f"is not a life of the joints {joints}, expected the output of `life --json`"
+            path, "", f"is not a life of the joints {joints}. Expected the output of `life --json`"
         ) from error
 
 
 def _document(path: str) -> dict[str, Any]:
     document = read_json(path)
     if not isinstance(document, dict):
-        raise ConfigError(path, "", "is not a life, expected the output of `life --json`")
+        raise ConfigError(path, "", "is not a life. Expected the output of `life --json`")
     version = document.get("schema_version", 1)
     if version != SCHEMA_VERSION:
         fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this program reads"

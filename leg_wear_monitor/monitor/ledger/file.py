@@ -82,7 +82,7 @@ def damage_refused(path: Path) -> Iterator[None]:
         if code == sqlite3.SQLITE_BUSY:
             fault = "is in use by another monitor. End that monitor, or set a different ledger.path"
         elif code in _NOT_WRITABLE:
-            fault = f"cannot be written: {one_line(error)}; expected a writable disk"
+            fault = f"cannot be written: {one_line(error)}. Expected a writable disk"
         else:
             fault = f"is damaged or not a ledger: {one_line(error)}; {REMEDY}"
         raise LedgerError(f"{path}: {fault}") from error
@@ -139,7 +139,7 @@ def _create(path: Path, binding: Binding) -> None:
         new.rename(path)
     except (sqlite3.Error, OSError) as error:
         reason = error.strerror if isinstance(error, OSError) else one_line(error)
-        raise LedgerError(f"{path}: cannot be created: {reason}; expected a writable place") from error
+        raise LedgerError(f"{path}: cannot be created: {reason}. Expected a writable place") from error
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:

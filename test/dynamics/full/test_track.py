@@ -170,7 +170,7 @@ def test_the_clearance_model_says_what_it_needs(document):
         ({"feed_forward_nm": "much"}, r"drive.track.feed_forward_nm: 'much' is not a number"),
         (
             {"feed_forward_nm": [1.0, 2.0]},
-            r"drive.track.feed_forward_nm: has 2 torques for 1 phases, expected one each",
+            r"drive.track.feed_forward_nm: has 2 torques for 1 phases. Expected one each",
         ),
         (
             {"feed_forward_nm": [1.0, 2.0], "feed_forward_phase": [0.5, 0.5]},
@@ -186,5 +186,5 @@ def test_a_controller_that_cannot_be_is_refused(track, fault):
 def test_one_kind_of_drive_at_a_time(document):
     four_bar = _tracked(document, "four_bar")
     four_bar["drive"]["torque"] = 1.0
-    with pytest.raises(ConfigError, match=r"drive: has torque and track, expected one of speed .*, track"):
+    with pytest.raises(ConfigError, match=r"drive: has torque and track. Expected one of speed .*, track"):
         parse_mechanism(four_bar, "four_bar")

@@ -80,7 +80,7 @@ def test_the_factor_three_of_archards_k() -> None:
 
 
 def test_a_k_without_hardness_is_refused_and_hardness_without_a_k() -> None:
-    with pytest.raises(ValueError, match="hardness: is missing, expected the hardness H"):
+    with pytest.raises(ValueError, match=r"hardness: is missing\. Expected the hardness H"):
         wear(7.0e-3, "K of V = K F s / H")
     with pytest.raises(ValueError, match="hardness: does not belong to a coefficient in 1/Pa"):
         wear(1.0e-15, "1/Pa", number(1.0, "GPa"))
@@ -136,7 +136,7 @@ def test_a_file_of_ones_own(tmp_path: Path) -> None:
         ("value: 0.1,", "valeu: 0.1,", ["friction.valeu", "did you mean value?"]),
         ("value: 0.1, ", "", ["friction.value", "range"]),
         ('unit: "1"', "unit: Nm", ["friction.unit", "'Nm'", "MPa"]),
-        ('unit: "1"', "unit: MPa", ["friction", "'MPa'", "number", "expected 1"]),
+        ('unit: "1"', "unit: MPa", ["friction", "'MPa'", "number", "Expected 1"]),
         ("value: 0.1", "value: -0.1", ["friction", "-0.1", "above 0"]),
         ("value: 0.1", "range: [0.2, 0.1]", ["friction.range", "does not rise"]),
         ("value: 0.1", "value: soft", ["friction.value", "'soft'", "not a number"]),

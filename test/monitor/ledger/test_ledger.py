@@ -168,7 +168,7 @@ def test_what_is_no_ledger_is_refused_and_left_alone(open_ledger, tmp_path, make
 
 
 def test_a_place_that_cannot_be_written_is_refused(open_ledger, tmp_path):
-    with pytest.raises(LedgerError, match=r"cannot be created: .*expected a writable place"):
+    with pytest.raises(LedgerError, match=r"cannot be created: .*Expected a writable place"):
         open_ledger(path=tmp_path / "nowhere" / "wear.ledger")
 
 

@@ -83,7 +83,7 @@ def ten_million(leg: Mechanism) -> None:
     k = int(life.clearance_m[-1].argmax())
     cycles = life.cycles_to(k, LIMIT_M)
     print(f"\nto the limit: {cycles:.3g} cycles in {took:.1f} s, {len(life.cycles) - 1} jumps")
-    settings, growth = Forecasting(wear_coefficient_sigma=0.7), life.growth_m_per_cycle[:3].mean(axis=0)
+    settings, growth = Forecasting(), life.growth_m_per_cycle[:3].mean(axis=0)
     law = law_of(leg, "", settings.model_sigma)
     now = [
         JointCondition(

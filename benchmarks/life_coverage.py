@@ -23,6 +23,7 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
+from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import (
@@ -39,7 +40,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear,
 LIMIT_M = 6.0e-4
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
 STEPS = 100  # of a joint's way to its limit, in the truth by a law
-SETTINGS = Forecasting(wear_coefficient_sigma=0.7)
+SETTINGS = Forecasting()
 MOST_JUMPS = 400  # of a life
 
 
@@ -63,9 +64,7 @@ def hidden_life(leg: Mechanism, number: int) -> HiddenLife:
     k, seed = len(leg.clearance_joints), number - 1
     clearances, factor = dict(leg.clearances), np.ones(k)
     if number:
-        factor *= np.exp(
-            SETTINGS.wear_coefficient_sigma * np.random.default_rng(1000 + seed).standard_normal(k)
-        )
+        factor *= np.exp(USUAL_SPREAD * np.random.default_rng(1000 + seed).standard_normal(k))
         off = SETTINGS.clearance_sigma_m * np.random.default_rng(5000 + seed).standard_normal(k)
         for joint, more in zip(leg.clearance_joints, off.tolist(), strict=True):
             was = clearances[joint]
@@ -118,7 +117,7 @@ def truth_by_law(lives: list[HiddenLife], legs: int, random: np.random.Generator
 
 
 def lived(law: np.ndarray, off: np.ndarray, joints: int, random: np.random.Generator) -> HiddenLife:
-    factor = np.exp(SETTINGS.wear_coefficient_sigma * random.standard_normal(joints))
+    factor = np.exp(USUAL_SPREAD * random.standard_normal(joints))
     fresh = FRESH_M + SETTINGS.clearance_sigma_m * random.standard_normal(joints)
     own = factor * np.exp(off * random.standard_normal(joints))
     clearance, cycles, growth = [fresh], [0.0], []

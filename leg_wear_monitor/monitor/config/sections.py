@@ -106,15 +106,6 @@ def _of_file(drive: Drive, output_turns: float) -> DriveFigures:
 # Parameters of the forecast: uncertain quantities and their standard deviations.
 
 
-_LEAST_SIGMA = 0.001  # below, the grid of the estimate would be finer than rounding
-
-
-def _not_next_to_0(sigma: float) -> str | None:
-    if sigma == 0.0 or sigma >= _LEAST_SIGMA:
-        return None
-    return f"{sigma!r} is neither 0 nor at least {_LEAST_SIGMA:g}"
-
-
 @attrs.frozen(kw_only=True)
 class Forecasting:
     """Uncertainties of the forecast as standard deviations; for factors, of the natural logarithm.
@@ -122,14 +113,6 @@ class Forecasting:
     Values without a description are constants of the method, not parameters.
     """
 
-    wear_coefficient_sigma: float = quantity(
-        "",
-        "standard deviation of the logarithm of a joint's wear coefficient; 0 takes the spread of the "
-        "joint's material pair, or 0.7 without one",
-        within=(0.0, 3.0),
-        default=0.0,
-        check=_not_next_to_0,
-    )
     load_sigma: float = 0.1  # for future wear per cycle, because load and pace vary
     model_sigma: float = 0.4  # for the growth without simulated lives, and beyond them (forecast.md)
     clearance_sigma_m: float = 5.0e-6  # for a new joint's clearance

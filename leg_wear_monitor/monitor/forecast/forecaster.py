@@ -346,7 +346,6 @@ class Forecaster:
             who=who,
             kept_ns=kept_ns,
             accept=accept,
-            prior=usual_prior(self._settings, self._clearances[k]),
             corrections=self.corrections,
         )
         self.measurements += (found.measurement,)
@@ -402,7 +401,7 @@ class Forecaster:
             self._settings,
             self._fresh_m[k],
             [*observations, *further],
-            usual_prior(self._settings, self._clearances[k]),
+            usual_prior(self._clearances[k]),
             corrections_of(self.corrections, joint, replaced_ns),
         )
 

@@ -15,9 +15,9 @@ from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientEstimate,
-    CoefficientPrior,
     corrections_of,
     estimate_coefficient,
+    usual_prior,
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement, Recount
 
@@ -206,7 +206,6 @@ def measure(
     who: str,
     kept_ns: int = 0,
     accept: bool = False,
-    prior: CoefficientPrior | None = None,
     corrections: Sequence[Recount] = (),
 ) -> MeasurementResult:
     """Evaluate a measured clearance.
@@ -229,8 +228,6 @@ def measure(
         Stamp of the ledger's last entry, 0 if there is none.
     accept : bool
         Whether it counts even if it contradicts the model.
-    prior : CoefficientPrior, optional
-        Without it, the configured spread about the nominal coefficient.
     corrections : sequence of CorrectedClearance and CoefficientSpan
         All of the ledger.
 
@@ -249,6 +246,7 @@ def measure(
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
     observation = ClearanceAtWear(clearance_m, sigma_m, wear.mean_m)
     corrected = corrections_of(corrections, wear.name, wear.replaced_ns)
+    prior = usual_prior(clearance)
     before = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
     below = before.probability_below(observation)
     contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS

@@ -85,20 +85,15 @@ def _further(was_per_pa: float, now_per_pa: float) -> str:
     )
 
 
-def usual_prior(settings: Forecasting, clearance: Clearance | None = None) -> CoefficientPrior:
+def usual_prior(clearance: Clearance | None = None) -> CoefficientPrior:
     """Prior of a joint before any measurement (docs/decisions/0012-wear-prior.md).
 
     Parameters
     ----------
-    settings : Forecasting
-        A configured spread comes first.
     clearance : Clearance, optional
         Settings of the joint, whose material pair may give a spread; `USUAL_SPREAD` if it does not.
     """
     regime = regime_of(clearance) if clearance else ""
-    if settings.wear_coefficient_sigma > 0.0:
-        basis = "forecast.wear_coefficient_sigma"
-        return CoefficientPrior(sigma=settings.wear_coefficient_sigma, basis=basis, holds_for=regime)
     of_pair = spread_of(clearance, USUAL_SPREAD) if clearance else None
     if clearance is None or of_pair is None:
         basis = "usual scatter of wear coefficients"
@@ -247,11 +242,11 @@ def estimate_coefficient(
         Nominal clearance when new.
     observations : sequence of ClearanceAtWear
     prior : CoefficientPrior, optional
-        Without it, the configured or usual spread about the nominal coefficient.
+        Without it, the usual spread about the nominal coefficient.
     corrections : sequence of CorrectedClearance and CoefficientSpan
         Of its modelled clearance, in the order of time.
     """
-    prior = prior or usual_prior(settings)
+    prior = prior or usual_prior()
     mean, precision = measured_factor(settings, fresh_m, observations, corrections)
     if math.sqrt(precision) * mean * prior.sigma < 1.0:
         # nothing is known better than the nominal coefficient: a new one says nothing of the wear before it

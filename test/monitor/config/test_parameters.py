@@ -38,8 +38,6 @@ WRONG = [
     ("drive_torque.source", "odometry", ["'odometry'", "wrench, float64, effort, interface"]),
     ("cadence.commanded_rpm", 5e-324, ["Expected a speed of at least 0.1 rpm either way"]),
     ("limits.impact_force_n", 5e-324, ["too close to 0. Expected more than 1e-30 N"]),
-    ("forecast.wear_coefficient_sigma", 3.5, ["3.5", "at most"]),
-    ("forecast.wear_coefficient_sigma", 9e-4, ["0.001"]),
     ("wear_acceleration", 1e-12, ["not at least 1e-09"]),
     ("limits.growth_m_per_hour", 1e300, ["too large. Expected at most"]),
     ("publish_markers", "on", ["'on'", "not true or false"]),
@@ -157,7 +155,7 @@ def test_what_is_within_the_bounds_is_taken_and_kept(parameter, data):
             # a crank that stands, and what is as good as 0 where that cannot be, are refused
             lambda value: (
                 abs(value)
-                >= {"cadence.commanded_rpm": 0.1, "forecast.wear_coefficient_sigma": 0.001}.get(
+                >= {"cadence.commanded_rpm": 0.1}.get(
                     parameter.name, 1.0e-30 if parameter.above == 0.0 else 0.0
                 )
             )

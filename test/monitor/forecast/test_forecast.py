@@ -58,7 +58,7 @@ def test_what_is_not_known_adds_up_in_squares():
 def test_lives_that_end_early_leave_the_rest_of_the_way_unknown():
     """Lives to 0.31 mm say nothing of 0.6 mm: p10 to p90 are as wide as without lives."""
     now = np.array([NOW.fresh_m])
-    sure = attrs.evolve(SURE, model_sigma=0.4, wear_coefficient_sigma=0.01)
+    sure = attrs.evolve(SURE, model_sigma=0.4)
     law = GrowthLaw(np.zeros((1, 1)), now, np.array([3.1e-4]), np.array([0.01]), lives=5)
     found, without = (alone(settings=sure, law=one).cycles for one in (law, no_law(now, 0.4)))
     assert np.log(found.p90 / found.p10) == pytest.approx(np.log(without.p90 / without.p10), rel=0.06)

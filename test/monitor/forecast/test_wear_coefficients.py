@@ -10,12 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.monitor.config.sections import Forecasting
 from leg_wear_monitor.monitor.forecast.measurement import measure
-from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
+    CoefficientPrior,
+    estimate_coefficient,
+)
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 
-FRESH, PRIOR = 3.0e-4, Forecasting(wear_coefficient_sigma=0.7)
+FRESH, PRIOR = 3.0e-4, Forecasting()
 CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
 HOUR = 3_600_000_000_000
 
@@ -34,9 +39,9 @@ def found(wear, mm, earlier=(), **more):
 def test_without_a_measurement_the_belief_is_the_lognormal_prior():
     coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
     assert coefficient_estimate.mean == pytest.approx(0.0, abs=1e-12)
-    assert coefficient_estimate.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    assert coefficient_estimate.sigma == pytest.approx(USUAL_SPREAD, rel=1e-3)
     z = statistics.NormalDist().inv_cdf(0.9)
-    assert coefficient_estimate.log_factors(0.9) == pytest.approx(PRIOR.wear_coefficient_sigma * z, rel=1e-3)
+    assert coefficient_estimate.log_factors(0.9) == pytest.approx(USUAL_SPREAD * z, rel=1e-3)
 
 
 @given(st.floats(0.3, 3.0))
@@ -95,7 +100,7 @@ def test_the_order_of_measurements_does_not_matter(order):
 
 def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coefficient():
     coefficient_estimate = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.05e-4, 5e-6, 0.0)])
-    assert coefficient_estimate.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    assert coefficient_estimate.sigma == pytest.approx(USUAL_SPREAD, rel=1e-3)
     # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
     np.testing.assert_allclose(coefficient_estimate.excess_m, 2.5e-6)
     assert coefficient_estimate.excess_sigma_m == pytest.approx(5e-6 / math.sqrt(2.0))
@@ -114,7 +119,7 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     random, wear = np.random.default_rng(3), 6e-5
     coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
     drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
-    drawn += wear * np.exp(PRIOR.wear_coefficient_sigma * random.standard_normal(400))
+    drawn += wear * np.exp(USUAL_SPREAD * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
     below = [coefficient_estimate.probability_below(ClearanceAtWear(c, 5e-6, wear)) for c in drawn]
     assert 0.75 <= np.mean((np.array(below) > 0.1) & (np.array(below) < 0.9)) <= 0.85
@@ -148,7 +153,7 @@ def test_a_contradiction_is_said_and_kept_but_does_not_count():
 def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
     """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
     result = found(worn(5e-11), 0.63, accept=True)
-    assert "that is 6.5e-09 1/Pa, usual are below 1e-09 1/Pa" in result.words[-1]
+    assert "that is 6.6e-09 1/Pa, usual are below 1e-09 1/Pa" in result.words[-1]
     shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
     assert result.words[-1] in attrs.evolve(shown, limit_m=1e-3).lines
     assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]
@@ -176,9 +181,9 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
 @given(st.floats(0.02, 3.0), st.floats(-1.0, 60.0), st.floats(0.1, 10.0))
 def test_the_estimate_is_its_prior_times_the_likelihood(sigma, factor, own):
     """Against a sum over a wide and fine grid."""
-    exact = Forecasting(wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
+    exact = Forecasting(clearance_sigma_m=1e-9)
     observation = ClearanceAtWear(3.0e-4 + factor * 1e-5, own * 1e-5, 1e-5)
-    found = estimate_coefficient(exact, 3.0e-4, [observation])
+    found = estimate_coefficient(exact, 3.0e-4, [observation], CoefficientPrior(sigma=sigma))
     u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
     density = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - factor) / own) ** 2
     weight = np.exp(density - density.max())

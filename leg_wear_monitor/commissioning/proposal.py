@@ -1,54 +1,131 @@
-"""The proposed parameters: each with its interval, and how it could be known better."""
+"""The proposed parameters with their intervals, and what a recording leaves open or contradicts."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.commissioning.evidence import (
-    Sampling,
     Timing,
     cadence_rpm,
-    scatter,
-    sensor_noise,
+    cadences_rpm,
+    sampling_of,
+    separates_lag,
+    timing_of,
+    with_load,
 )
 from leg_wear_monitor.commissioning.result import CommissioningItem as Item
-from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate, Choice, Rival
-from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate, Choice
 from leg_wear_monitor.estimate.drive import DriveFigures
-from leg_wear_monitor.estimate.joint_motion import JointMotion
+from leg_wear_monitor.estimate.joint_motion import JointMotion, with_repeating_acceleration
 from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.config.inputs import INTERFACE, WRENCH
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH
+from leg_wear_monitor.monitor.config.sections import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+# The chosen fit again, with the terms that the recording determines and the lag to allow for.
+
+
+_AS_WELL = 1.02  # a fit is as good as the best fit up to this ratio of torque residuals
+# fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
+# to 0.45 with instants at 50 to 200 Hz (full coordinates, 60 rpm)
+_UNEXPLAINED = 0.7
+# factor on the errors of friction where the foot carries a load, whose course is not known exactly
+_UNDER_LOAD = 3.0
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """Measured quantities from which the parameters are derived.
+
+    Attributes
+    ----------
+    choice : Choice
+    fit : Fit
+        With the lag to allow for.
+    motion : JointMotion
+        Motion of the chosen joint.
+    sampling, why_sampling : str
+        Sampling of the torque, empty if it is not known, and why.
+    timing : Timing
+    declared : DriveFigures
+    base : MonitorConfig
+    """
+
+    choice: Choice
+    fit: Fit
+    motion: JointMotion
+    sampling: str
+    why_sampling: str
+    timing: Timing
+    declared: DriveFigures
+    base: MonitorConfig
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why nothing is proposed; empty if the choice is sure, and explains the torque."""
+        mismatch = self.fit.mismatch
+        if mismatch < _UNEXPLAINED:
+            return self.choice.doubts
+        sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit this leg, with any choice"
+        return (*self.choice.doubts, sentence)
+
+    @property
+    def best(self) -> Candidate:
+        """The chosen joint and torque."""
+        return self.choice.best
+
+    def friction(self, name: str) -> tuple[float, float]:
+        """Friction on the crank and its standard deviation: constant [N m], or relative to the torque."""
+        one = self.fit
+        by_clearances = one.error.load_friction * abs(one.gain)
+        if name == "friction":
+            by_clearances = one.error.friction * float(one.predicted.std())
+        by_clearances *= _UNDER_LOAD if "load" in one.linear else 1.0
+        return one.linear[name] / one.gain, math.hypot(one.sigma[name], by_clearances) / abs(one.gain)
+
+
+def found_of(choice: Choice, motion: JointMotion, model: TorqueModel, base: MonitorConfig) -> Found:
+    """Everything that the recording says about the chosen joint and torque."""
+    one, declared = choice.best.fit, drive_figures(base.drive)
+    terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
+    # a repeating acceleration has less noise, but lacks the acceleration of a ramp
+    pairs = one.pair, with_repeating_acceleration(one.pair, one.ratio)
+    own, smoother = (fit(pair, model, one.refined, terms, with_errors=True) for pair in pairs)
+    again = smoother if smoother.mismatch <= _AS_WELL * own.mismatch else own
+    again, terms = with_load(again, model, terms)
+    sampling, why = sampling_of(again, model)
+    timing = timing_of(again, sampling or base.drive_torque.sampling, bool(sampling), declared)
+    start = attrs.evolve(again.refined, lag_s=timing.lag_s)
+    settled = fit(again.pair, model, start, attrs.evolve(terms, lag=False), with_errors=True)
+    return Found(choice, settled, motion, sampling, why, timing, declared, base)
+
 
 # A gear's ratio is the ratio of two numbers of teeth: the simplest fraction within a measurement's error.
 
 
+_SURE = 3.0  # standard deviations
+_DRIFT_RAD = 0.05  # phase shift by clearances over a recording
 _LARGEST_DENOMINATOR = 20
 _BY_CHANCE = 0.1  # fractions that may lie within the error by chance
 
 
 def exact_ratio(measured: float, error: float) -> float | None:
-    """The simplest fraction within a relative error, if it is not one of many.
+    """The simplest fraction within a relative error; None if there is none, or one would be by chance.
 
     Parameters
     ----------
     measured : float
-        Gear ratio; below 1, its inverse is taken for a fraction.
+        Gear ratio above 0; below 1, its inverse is taken for a fraction.
     error : float
         Largest relative error.
-
-    Returns
-    -------
-    float or None
-        None if no simple fraction lies within the error, or if one would by chance.
     """
-    if not measured > 0.0:
-        raise LegWearError(f"{measured!r} is not a gear ratio. Expected a number above 0")
     if measured < 1.0:
         inverse = exact_ratio(1.0 / measured, error)
         return None if inverse is None else 1.0 / inverse
@@ -63,89 +140,9 @@ def exact_ratio(measured: float, error: float) -> float | None:
     return None
 
 
-# The chosen fit and the parameters that follow from it.
-
-
-_SURE = 3.0  # standard deviations
-_DRIFT_RAD = 0.05  # phase shift by clearances over a recording
-# fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
-# to 0.45 with instants at 50 to 200 Hz (full coordinates, 60 rpm)
-UNEXPLAINED = 0.7
-# factor on the errors of friction where the foot carries a load, whose course is not known exactly
-_UNDER_LOAD = 3.0
-
-
-@attrs.frozen(eq=False)
-class Found:
-    """Measured quantities from which the parameters are derived."""
-
-    choice: Choice
-    fit: Fit
-    motion: JointMotion
-    sampling: Sampling
-    timing: Timing
-    declared: DriveFigures
-    base: MonitorConfig
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Why nothing is proposed; empty if the choice is sure, and explains the torque."""
-        mismatch = self.fit.mismatch
-        if mismatch < UNEXPLAINED:
-            return self.choice.doubts
-        sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit this leg, with any choice"
-        return (*self.choice.doubts, sentence)
-
-    @property
-    def best(self) -> Candidate:
-        """The chosen joint and torque."""
-        return self.choice.best
-
-    @property
-    def used_sampling(self) -> str:
-        """The sampling found, or the given parameter's sampling if it is not known."""
-        return self.sampling.value or self.base.drive_torque.sampling
-
-    @property
-    def friction_nm(self) -> tuple[float, float]:
-        """Constant friction on the crank, and its standard deviation [N m]."""
-        one = self.fit
-        by_clearances = one.error.friction * self._roughly * float(one.predicted.std())
-        sigma = math.hypot(one.sigma["friction"], by_clearances)
-        return one.linear["friction"] / one.gain, sigma / abs(one.gain)
-
-    @property
-    def load_friction(self) -> tuple[float, float]:
-        """Friction as a fraction of the torque's size, and its standard deviation."""
-        one = self.fit
-        by_clearances = one.error.load_friction * self._roughly
-        sigma = math.hypot(one.sigma["load_friction"] / one.gain, by_clearances)
-        return one.linear["load_friction"] / one.gain, sigma
-
-    @property
-    def _roughly(self) -> float:
-        """Factor on the changes by clearances."""
-        return _UNDER_LOAD if "load" in self.fit.linear else 1.0
-
-    @property
-    def turned_radps(self) -> float:
-        """Usual speed of the crank, without its sign: by it, a lag looks like an offset."""
-        return float(np.median(np.abs(self.fit.crank()[1])))
-
-
-def settled(found: Found, model: TorqueModel) -> Found:
-    """The same with a fit for the lag to allow for."""
-    timing, one = found.timing, found.fit
-    if timing.is_lag_separated:
-        terms = Terms(bias="bias" in one.linear, load="load" in one.linear, load_friction=True)
-        start = attrs.evolve(one.refined, lag_s=timing.lag_s)
-        one = fit(one.pair, model, start, terms, with_errors=True)
-    return attrs.evolve(found, fit=one)
-
-
 def gear(found: Found) -> tuple[float, bool]:
     """Gear ratio, and whether it is exact: the given one or a fraction of small numbers within the error."""
-    measured, error = found.fit.gear_ratio, gear_error(found.fit)
+    measured, error = found.fit.gear_ratio, _gear_error(found.fit)
     given = found.base.crank.gear_ratio
     if abs(given / measured - 1.0) <= error:
         return given, True
@@ -153,7 +150,7 @@ def gear(found: Found) -> tuple[float, bool]:
     return (measured, False) if exact is None else (exact, True)
 
 
-def gear_error(one: Fit) -> float:
+def _gear_error(one: Fit) -> float:
     """Largest relative error of the gear ratio."""
     travel = abs(one.ratio) * float(np.ptp(one.pair.position_rad))
     return _SURE * one.sigma["ratio"] / abs(one.ratio) + _DRIFT_RAD / max(travel, 1.0e-9)
@@ -162,62 +159,21 @@ def gear_error(one: Fit) -> float:
 def offset_rad(found: Found, number: int) -> float:
     """Crank angle at joint position 0 of a recording, from -pi to pi."""
     one = found.fit
-    offset = one.offset_rad[number]
     # the exact ratio instead of the measured one leaves the phase in the middle of the recording as it is
     middle = float(np.median(one.pair.position_rad[one.pair.recording == number]))
-    offset += (one.ratio - one.direction / gear(found)[0]) * middle
-    # at one cadence, a lag is a part of the phase
-    offset += (found.timing.lag_s - one.lag_s) * float(np.median(one.crank()[1]))
+    offset = one.offset_rad[number] + (one.ratio - one.direction / gear(found)[0]) * middle
     return float((offset + math.pi) % TURN - math.pi)
 
 
-def offset_sigma_rad(found: Found) -> float:
+def _offset_sigma_rad(found: Found) -> float:
     """Standard deviation of the offset, with the effect of clearances, a repeating residual and a lag."""
-    one, timing = found.fit, found.timing
+    one = found.fit
+    angle, speed, _ = one.crank()
     # were all of the rest that repeats a shift of the phase, it would shift by this
-    slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(one.crank()[0]))
+    slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(angle))
     by_rest = repeating(one) * float(one.measured.std() / np.sqrt(np.mean(slope**2)))
-    by_lag = timing.lag_sigma_s * found.turned_radps
+    by_lag = found.timing.sigma_s * float(np.median(np.abs(speed)))
     return math.hypot(one.sigma["offset_rad"], one.error.phase_rad, by_rest, by_lag)
-
-
-# How each quantity could be known better than a recording shows it.
-
-
-_FURTHER = "record cadences further apart"
-_TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
-
-
-def better(name: str, found: Found) -> str:
-    """Measure that would determine a quantity better; empty if none is needed."""
-    return _WAYS[name](found) if name in _WAYS else ""
-
-
-def _offset(found: Found) -> str:
-    by_lag = found.timing.lag_sigma_s * found.turned_radps
-    if by_lag <= found.fit.error.phase_rad:
-        return "turn the crank to a known angle, such as a dead centre"
-    if found.timing.is_lag_separated:
-        return f"{_FURTHER}, or declare drive.lag_s"
-    return f"{_TWO_CADENCES}, or declare drive.lag_s"
-
-
-def _lag(found: Found) -> str:
-    if math.isfinite(found.declared.lag_s):
-        return ""
-    return _FURTHER if found.timing.is_lag_separated else _TWO_CADENCES
-
-
-_WAYS: Mapping[str, Callable[[Found], str]] = {
-    "crank.gear_ratio": lambda found: "" if gear(found)[1] else "enter the ratio of the teeth",
-    "crank.offset_rad": _offset,
-    "drive_torque.scale": lambda _: "measure the torque of a known weight on the crank",
-    "drive_torque.sampling": lambda found: "" if found.sampling.value else "ask the drive's manual",
-    "lag": _lag,
-    "load friction": lambda found: (
-        f"declare drive.type: clearances change it by {found.fit.error.load_friction:.2g}"
-    ),
-}
 
 
 # Parameters of the monitor from the chosen fit, each with its error and its runner-up.
@@ -229,8 +185,7 @@ _HALF_A_GEAR = 0.5, 1.5  # efficiencies for which a torque may be measured at th
 
 def items(found: Found) -> list[Item]:
     """Everything that was looked for, parameters first."""
-    quantities = [*_crank(found), *_torque(found), *_timing(found), *_noises(found)]
-    return [attrs.evolve(item, better=better(item.name, found)) for item in quantities]
+    return [*_crank(found), *_torque(found), *_drive(found)]
 
 
 def changes(found: list[Item]) -> dict[str, Any]:
@@ -242,19 +197,15 @@ def _chosen(found: Found, name: str, **own: Any) -> Item:
     """A choice among candidates, with the best one that differs in it."""
     rival = found.choice.rivals.get(name)
     if rival:
-        own |= {"other": _value(name, rival), "other_mismatch": rival.candidate.fit.mismatch}
+        values = {
+            "crank_joint": rival.joint.joint,
+            "drive_torque.source": rival.torque.label,
+            "crank.sign": rival.fit.direction,
+            "drive_torque.sign": rival.fit.torque_sign,
+            "crank.gear_ratio": float(f"{rival.fit.gear_ratio:.4g}"),
+        }
+        own |= {"other": values[name], "other_mismatch": rival.fit.mismatch}
     return Item(name=name, mismatch=found.fit.mismatch, **own)
-
-
-def _value(name: str, rival: Rival) -> str | int | float:
-    one = rival.candidate
-    if name == "crank_joint":
-        return one.joint.joint
-    if name == "drive_torque.source":
-        return one.torque.label
-    if name == "crank.sign":
-        return one.fit.direction
-    return one.fit.torque_sign if name == "drive_torque.sign" else float(f"{one.fit.gear_ratio:.4g}")
 
 
 def _crank(found: Found) -> Iterator[Item]:
@@ -269,14 +220,13 @@ def _crank(found: Found) -> Iterator[Item]:
         sigma=one.gear_ratio * one.sigma["ratio"] / abs(one.ratio),
         remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a fraction of small numbers",
     )
-    last = max(one.offset_rad)
     yield Item(
         name="crank.offset_rad",
-        value=round(offset_rad(found, last), 4),
+        value=round(offset_rad(found, max(one.offset_rad)), 4),
         unit="rad",
-        sigma=offset_sigma_rad(found),
+        sigma=_offset_sigma_rad(found),
         remark="clearances shift the torque's phase"
-        + ("" if found.timing.is_lag_separated else ", at one cadence a lag as well"),
+        + ("" if found.timing.is_separated else ", at one cadence a lag as well"),
         mismatch=one.mismatch,
     )
 
@@ -299,6 +249,11 @@ def _torque(found: Found) -> Iterator[Item]:
         remark=f"scale times gear ratio measured {total:.4g}",
     )
     yield Item(name="drive_torque.gear_ratio", value=turns)
+    yield Item(
+        name="drive_torque.sampling",
+        value=found.sampling or found.base.drive_torque.sampling,
+        remark=found.why_sampling if found.sampling else "as given: not enough to tell",
+    )
 
 
 def _scale(found: Found) -> tuple[float, float]:
@@ -314,59 +269,148 @@ def _scale(found: Found) -> tuple[float, float]:
     return (1.0 if abs(scale - 1.0) <= _NEAR else float(f"{scale:.4g}")), turns
 
 
-def _timing(found: Found) -> Iterator[Item]:
-    one, timing = found.fit, found.timing
-    yield Item(
-        name="drive_torque.sampling",
-        value=found.used_sampling,
-        remark=found.sampling.why if found.sampling.value else "as given: not enough to tell",
-    )
+def _drive(found: Found) -> Iterator[Item]:
+    one, timing, declared, is_separated = found.fit, found.timing, found.declared, found.timing.is_separated
     yield Item(
         name="lag",
         value=timing.late_s,
         unit="s",
-        sigma=timing.error_s if timing.is_lag_separated else None,
-        remark="of the torque, beside that of its sampling"
-        if timing.is_lag_separated
-        else "cannot be distinguished from an offset at one cadence",
+        sigma=timing.error_s if is_separated else None,
+        remark="in addition to the sampling" if is_separated else "at one cadence, it looks like an offset",
     )
     cadence, tolerance = cadence_rpm(one)
     yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")
     yield Item(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
-
-
-def _frictions(found: Found) -> Iterator[Item]:
-    declared = found.declared
-    friction, sigma = found.friction_nm
-    yield Item(
-        name="friction",
-        value=friction,
-        unit="N m",
-        sigma=sigma,
-        remark="constant, on the crank" + _declared(declared.coulomb_nm, " N m"),
-    )
-    friction, sigma = found.load_friction
-    yield Item(
-        name="load friction",
-        value=friction,
-        sigma=sigma,
-        remark="as a fraction of the torque's size" + _declared(declared.load_friction),
-    )
-
-
-def _declared(value: float, unit: str = "") -> str:
-    return f"; declared: {value:.4g}{unit}" if math.isfinite(value) else ""
-
-
-def _noises(found: Found) -> Iterator[Item]:
-    one = found.fit
-    yield from _frictions(found)
+    for name, unit, remark, given in (
+        ("friction", "N m", "constant, on the crank", declared.coulomb_nm),
+        ("load_friction", "", "as a fraction of the torque's size", declared.load_friction),
+    ):
+        value, sigma = found.friction(name)
+        known = f"; declared: {given:.4g} {unit}".rstrip() if math.isfinite(given) else ""
+        yield Item(name=name.replace("_", " "), value=value, unit=unit, sigma=sigma, remark=remark + known)
     if "bias" in one.linear:
         bias = one.linear["bias"] / one.gain
         yield Item(name="bias", value=bias, unit="N m", sigma=one.sigma["bias"] / abs(one.gain))
-    yield Item(name="noise of the encoder", value=found.motion.noise_rad, unit="rad")
-    quiet = sensor_noise(one) / abs(one.gain)
-    yield Item(name="noise of the torque", value=quiet, unit="N m", remark="in the quietest part of the turn")
-    rest = scatter(one) / abs(one.gain)
-    yield Item(name="scatter", value=rest, unit="N m", remark="from turn to turn, over 1/12 turn")
-    yield Item(name="rate of the joint", value=found.motion.rate_hz, unit="Hz")
+
+
+# Sentences on undetermined parameters, on quantities that do not fit, and on further information.
+
+
+_KNOWN_SIGMAS = 2.0  # standard deviations that must be below the requested accuracy
+_ANEW_RAD = 0.1  # offsets of two recordings of one absolute encoder differ by less
+_ROUGH_SCALE = 0.05
+_ROUGH_REST = 0.15  # a repeating residual that may shift the scale more than twice as much as clearances
+# Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque
+_NOTABLE_REST = 0.2
+_AT_ZERO_RAD = 0.02
+_DRIVES = 0.02  # a constant torque that drives the crank, as a fraction of the torque's size
+
+
+def not_told(found: Found) -> Iterator[str]:
+    """Parameters that the recording does not determine, and why."""
+    one, timing = found.fit, found.timing
+    yield from found.doubts
+    if not found.sampling:
+        yield f"drive_torque.sampling: {found.why_sampling}; ask the drive's manual"
+    if not (timing.is_separated or timing.is_declared):
+        turned = 1.0e-3 * abs(float(np.median(one.crank()[1])))
+        yield (
+            f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
+            "record two cadences in one recording, 40 rpm apart, or declare drive.lag_s"
+        )
+    elif not timing.is_declared and _KNOWN_SIGMAS * timing.sigma_s > MAX_LAG_S:
+        error = 1.0e3 * _KNOWN_SIGMAS * timing.sigma_s
+        yield (
+            f"lag: known to ± {error:.2g} ms only, more than the {1.0e3 * MAX_LAG_S:g} ms that are accepted, "
+            "because clearances shift the torque's phase with the cadence; record cadences further apart"
+        )
+    ratio, is_exact = gear(found)
+    if not is_exact:
+        error = one.sigma["ratio"] / abs(one.ratio)
+        away = error * abs(float(one.crank()[1].mean())) * 3600.0
+        yield (
+            f"crank.gear_ratio: {ratio:.7g} is known to ± {error * ratio:.2g}, so the crank angle drifts "
+            f"by up to {away:.2g} rad in an hour; enter the ratio of the teeth"
+        )
+    scale, rest = one.sigma["gain"] / abs(one.gain), repeating(one)
+    if scale > _ROUGH_SCALE:
+        yield f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer"
+    elif rest > _ROUGH_REST:
+        yield (
+            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit; the scale "
+            "may be wrong by as much"
+        )
+
+
+def findings(found: Found, mechanism: Mechanism) -> Iterator[str]:
+    """Quantities that do not fit, or that cannot be used as they are."""
+    one = found.fit
+    if "load" in one.linear:
+        force, sigma = one.linear["load"] / one.gain, one.sigma["load"] / abs(one.gain)
+        yield (
+            f"a foot load of {force:.3g} N ± {sigma:.2g} N explains most of the torque that does not fit; "
+            "the proposal allows for it, but record with the foot in the air"
+        )
+    if not found.doubts:  # friction and phases say nothing about an unknown leg
+        yield from _of_known_leg(found, mechanism)
+    for unit, ratio in (("degrees", TURN / 360.0), ("turns", TURN)):
+        if abs(one.gear_ratio * ratio - 1.0) < 2.0 * _gear_error(one):
+            yield f"the joint's position looks like {unit}; ROS expects radians: gear ratio {1.0 / ratio:.6g}"
+    if found.motion.is_wrapped and gear(found)[0] != 1.0:
+        yield (
+            f"the joint's position is wrapped to a turn, but its gear ratio is {one.gear_ratio:.6g}: the "
+            "monitor needs a continuous position"
+        )
+
+
+def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
+    one, timing = found.fit, found.timing
+    rest = repeating(one)
+    if rest > _NOTABLE_REST:
+        yield (
+            f"{100.0 * rest:.0f} % of the torque repeats with each turn and does not fit {mechanism.name}: "
+            "other masses or lengths, a spring, a load, or impacts that a sensor of instants does not average"
+        )
+    friction, sigma = found.friction("friction")
+    if friction < -_SURE * sigma and abs(friction) > _DRIVES * float(one.predicted.std() / abs(one.gain)):
+        size = f"{-friction:.2g} ± {sigma:.1g} N m"
+        yield f"a constant torque of {size} drives the crank: zero the torque sensor"
+    late, most = timing.late_s, largest_lag_s(found.base)
+    if abs(late) - _SURE * timing.error_s > most:
+        yield (
+            f"the torque is late by {1.0e3 * late:.3g} ms, more than the accepted {1.0e3 * MAX_LAG_S:g} ms "
+            f"and the declared lag of the drive ({1.0e3 * most:.3g} ms)"
+        )
+    offsets = [offset_rad(found, number) for number in sorted(one.offset_rad)]
+    if max(abs(math.remainder(each - offsets[0], TURN)) for each in offsets) >= _ANEW_RAD:
+        each = ", ".join(f"{offset:.3f}" for offset in offsets)
+        yield (
+            f"the encoder starts at a different zero in each recording: the torque's phase gives the offsets "
+            f"{each} rad; the proposed offset is from the last recording and is valid until the next boot"
+        )
+
+
+def notes(found: Found) -> Iterator[str]:
+    """Further information for the operator."""
+    joint, torque = found.best.joint, found.best.torque
+    yield from found.choice.also
+    ratio = gear(found)[0]
+    if ratio != 1.0 and len(found.fit.offset_rad) == 1:
+        is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
+        seems = "its first reading is 0" if is_zero else "motor encoders often do"
+        yield (
+            f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each boot "
+            f"({seems}), the offset is valid until the next boot: set crank.zero to at_start"
+        )
+    for topic, name in ((joint.topic, "joint_states"), (torque.topic, "drive_torque")):
+        if topic != f"/{name}" and not (name == "drive_torque" and topic == joint.topic):
+            yield f"start the monitor with -r {name}:={topic}, replay with --{name.replace('_', '-')} {topic}"
+    if torque.source == FLOAT64:
+        yield "a Float64 has no stamp: the torque has its time of arrival, so delayed messages are a lag"
+    speeds = cadences_rpm(found.fit)
+    if len(speeds) > 1:
+        each = " and ".join(f"{speed:g}" for speed in speeds)
+        yield (
+            f"the leg walks at about {each} rpm; cadence.commanded_rpm is the most frequent one: "
+            "set it to the cadence of its work"
+        )

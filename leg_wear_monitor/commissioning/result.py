@@ -77,8 +77,6 @@ class CommissioningItem:
         Torque residual of the runner-up.
     remark : str
         Further information.
-    better : str
-        How it could be determined better; empty if it need not be.
     """
 
     name: str
@@ -89,7 +87,6 @@ class CommissioningItem:
     other: str | int | float | None = None
     other_mismatch: float | None = None
     remark: str = ""
-    better: str = ""
 
 
 @attrs.frozen(kw_only=True)

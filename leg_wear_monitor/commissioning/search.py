@@ -129,7 +129,6 @@ def candidates(
     joints: dict[JointName, JointMotion],
     torques: dict[TorqueSource, Series],
     model: TorqueModel,
-    progress: Callable[[float], None] = lambda _fraction: None,
 ) -> list[Candidate]:
     """Fits of all joints that turn with all torques, the best first; none if there is too little of them."""
     starts: list[tuple[JointName, TorqueSource, Pair, Pair, list[Start]]] = []
@@ -153,7 +152,6 @@ def candidates(
             continue
         kept = found[:1] if is_hopeless else found
         fitted += [Candidate(joint, torque, _refined(pair, steady, model, start)) for start in kept]
-        progress((i + 1) / len(starts))
     return sorted(fitted, key=lambda each: each.fit.mismatch)
 
 
@@ -183,43 +181,27 @@ def same_gear(one: Fit, other: Fit) -> bool:
 
 _SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, sensors of two legs by more
 _SIGNALS = ("crank_joint", "drive_torque.source")
-ANOTHER_LEG = 0.5  # repeating residual beyond which no known leg fits
-
-
-@attrs.frozen(eq=False)
-class Rival:
-    """The best candidate that differs in one respect.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    doubt : str
-        Why it may be the truth; empty if it cannot.
-    """
-
-    candidate: Candidate
-    doubt: str = ""
+_ANOTHER_LEG = 0.5  # repeating residual beyond which no known leg fits
 
 
 @attrs.frozen(eq=False)
 class Choice:
-    """The best candidate and its rivals: ``joint``, ``source``, ``direction``, ``torque sign``, ``gear``."""
+    """The best candidate, and the best one that differs in each respect, by the parameter that differs.
+
+    Attributes
+    ----------
+    best : Candidate
+    rivals : dict of str to Candidate
+    doubts : tuple of str
+        Why the choice is not sure; empty if it is.
+    also : tuple of str
+        Rivals that mean the same, such as a second encoder of the shaft.
+    """
 
     best: Candidate
-    rivals: dict[str, Rival]
+    rivals: dict[str, Candidate]
+    doubts: tuple[str, ...]
     also: tuple[str, ...]
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Why the choice is not sure; empty if it is."""
-        rest = repeating(self.best.fit)
-        sentences = [f"{name}: {rival.doubt}" for name, rival in self.rivals.items() if rival.doubt]
-        if rest > ANOTHER_LEG:
-            sentences.append(
-                f"a different leg: {100.0 * rest:.0f} % of the torque repeats with each turn and does not "
-                f"fit this mechanism at any crank angle"
-            )
-        return tuple(sentences)
 
 
 def choose(found: list[Candidate]) -> Choice:
@@ -236,17 +218,23 @@ def choose(found: list[Candidate]) -> Choice:
             lambda each: each.joint == best.joint and each.torque != best.torque,
         ),
     }
-    rivals, also = {}, []
+    rivals, doubts, also = {}, [], []
     for name, (among, differs) in respects.items():
         rival = next(filter(differs, among), None)  # the best one
         if rival is None:
             continue
-        alike = too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS)
-        same = alike and _is_the_same(name, best, rival)
-        rivals[name] = Rival(rival, _doubt(name, best, rival) if alike and not same else "")
-        if same:
-            also.append(_also(name, rival))
-    return Choice(best, rivals, tuple(also))
+        rivals[name] = rival
+        if too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS):
+            same = _as_same(name, best, rival)
+            also += [same] if same else []
+            doubts += [] if same else [f"{name}: {_doubt(name, best, rival)}"]
+    rest = repeating(best.fit)
+    if rest > _ANOTHER_LEG:
+        doubts.append(
+            f"a different leg: {100.0 * rest:.0f} % of the torque repeats with each turn and does not fit "
+            "this mechanism at any crank angle"
+        )
+    return Choice(best, rivals, tuple(doubts), tuple(also))
 
 
 def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
@@ -263,23 +251,16 @@ def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
     return min([best, *near], key=lambda each: abs(math.log(each.fit.gear_ratio)))
 
 
-def _is_the_same(name: str, best: Candidate, rival: Candidate) -> bool:
-    """Whether an equally good rival means the same: a second encoder of the shaft, a second sensor."""
-    if name == "crank_joint":
-        return on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit)
-    if name == "drive_torque.source":
-        number = best.fit.pair.recording[0].item()
-        apart = best.fit.offset_rad[number] - rival.fit.offset_rad.get(number, math.inf)
-        apart = abs((apart + math.pi) % TURN - math.pi) if math.isfinite(apart) else math.inf
-        same = best.fit.direction == rival.fit.direction and same_gear(best.fit, rival.fit)
-        return same and apart < _SAME_PHASE_RAD
-    return False
-
-
-def _also(name: str, rival: Candidate) -> str:
-    if name == "crank_joint":
+def _as_same(name: str, best: Candidate, rival: Candidate) -> str:
+    """Why an equally good rival means the same: a second encoder or sensor of the shaft; empty if not."""
+    if name == "crank_joint" and on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit):
         return f"{rival.joint.joint} also turns with the crank, at {rival.fit.gear_ratio:.6g} turns a turn"
-    return f"{rival.torque.label} is the same torque"
+    number = int(best.fit.pair.recording[0])
+    if name != "drive_torque.source" or number not in rival.fit.offset_rad:
+        return ""
+    apart = math.remainder(best.fit.offset_rad[number] - rival.fit.offset_rad[number], TURN)
+    same = best.fit.direction == rival.fit.direction and same_gear(best.fit, rival.fit)
+    return f"{rival.torque.label} is the same torque" if same and abs(apart) < _SAME_PHASE_RAD else ""
 
 
 def _doubt(name: str, best: Candidate, rival: Candidate) -> str:

@@ -141,17 +141,19 @@ def test_another_unit_of_the_torque_changes_the_scale_alone(walked: Walk, propos
     assert scales[0] == pytest.approx(1000.0 * float(scales[1]), rel=1.0e-3)
 
 
-@pytest.mark.parametrize(("lag_s", "sampling"), [(0.0, "instant"), (0.0025, "average")])
+@pytest.mark.parametrize("lag_s", [0.0, 0.0025])
 def test_two_cadences_tell_a_lag_from_an_offset(
-    lag_s: float, sampling: str, ideal_walk: MakeWalk, proposed: Propose
+    lag_s: float, ideal_walk: MakeWalk, proposed: Propose
 ) -> None:
     robot = Robot(offset_rad=1.0, lag_s=lag_s, torque_noise_nm=0.01)
     result = proposed(signals_of(robot, ideal_walk(30.0, 120.0)))
     assert result.config is not None
-    assert result.config.drive_torque.sampling == sampling
     assert result.config.crank.offset_rad == pytest.approx(1.0, abs=2.0e-3)
-    assert result.item("lag").value == pytest.approx(0.0, abs=2.0e-4)
-    assert result.is_sure, (result.not_told, result.findings)
+    # in addition to half of a sampling interval, as the given sampling is of averages
+    assert result.item("lag").value == pytest.approx(lag_s - 0.0025, abs=2.0e-4)
+    (sampling,) = result.not_told  # ideal joints have no impacts
+    assert sampling.startswith("drive_torque.sampling: ") and "no strong impacts" in sampling
+    assert not result.findings
 
 
 def test_a_late_torque_is_reported(ideal_walk: MakeWalk, proposed: Propose) -> None:
@@ -164,7 +166,7 @@ def test_one_cadence_is_not_enough_to_tell_the_sampling(ideal_walk: MakeWalk, pr
     result = proposed(signals_of(Robot(torque_noise_nm=0.01), ideal_walk(60.0)))
     assert math.isnan(float(result.item("lag").value))
     sampling, lag = result.not_told
-    assert sampling.startswith("drive_torque.sampling: ") and "the torque shows no strong impacts" in sampling
+    assert sampling.startswith("drive_torque.sampling: ") and "no strong impacts" in sampling
     assert "two cadences" in lag
     assert result.to_dict()["items"][[i.name for i in result.items].index("lag")]["value"] is None
 
@@ -394,16 +396,3 @@ def test_load_friction_is_found_and_moves_nothing(ideal_walk: MakeWalk, proposed
     assert friction.value == pytest.approx(0.5 * 1.25, abs=0.1)
     for name, most in (("crank.offset_rad", 5.0e-3), ("lag", 5.0e-4)):
         assert result.item(name).value == pytest.approx(without.item(name).value, abs=most)
-
-
-@pytest.mark.parametrize(("drive", "is_other"), [("erob80-50", True), ("", False)])
-def test_a_drive_that_rubs_otherwise_than_declared_is_noted(
-    drive: str, is_other: bool, ideal_walk: MakeWalk, leg: Mechanism, model: TorqueModel
-) -> None:
-    walk = ideal_walk(60.0)
-    rubbing = attrs.evolve(walk, torque_nm=walk.torque_nm + 0.25 * np.abs(walk.torque_nm))
-    base = load_config()
-    base = attrs.evolve(base, drive=attrs.evolve(base.drive, type=drive))
-    result = propose(signals_of(Robot(), rubbing), fitted(leg, base), base, model=model)
-    noted = [text for text in result.notes if "is drive.type right?" in text]
-    assert any(text.startswith("the load friction of the drive is 0.25") for text in noted) is is_other

@@ -106,7 +106,6 @@ def _print(result: "CommissioningResult") -> None:
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n", table, sep="\n")
     console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
     texts = {
-        "better known": [f"{item.name}: {item.better}" for item in result.items if item.better],
         "not enough to tell": result.not_told,
         "does not fit": result.findings,
         "note": result.notes,

@@ -135,7 +135,6 @@ scheduler_option: Option = option(
     "ADDRESS",
     "Dask scheduler whose workers compute in place of this machine, tcp://HOST:PORT.",
 )
-dry_run_option: Option = click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 recordings_argument: Option = click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
 )

@@ -137,9 +137,9 @@ def test_a_withdrawn_measurement_does_not_end_a_stop(run, worn_ledger, present):
     for mm in ("0.36", "0.37"):
         run("measure", "knee", mm, "--sigma", "0.01", "--ledger", str(path))
         assert verdict(path)[0] != "stop"
-    run("measure", "--withdraw", "1", "--ledger", str(path))
+    run("measure", "G", "--withdraw", "--ledger", str(path))
     assert verdict(path)[0] != "stop"  # the other one says so, too
-    run("measure", "--withdraw", "2", "--ledger", str(path))
+    run("measure", "G", "--withdraw", "--ledger", str(path))
     assert verdict(path)[:2] == before
     assert alarms(path)[0] == [("G", 2, 0, 1.7e-3, "torque")]
 
@@ -156,8 +156,8 @@ def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused,
     assert (rows(path), verdict(path)[0]) == ([], "stop")
     assert "at its limit" in run(*arguments, "--config", "mine.yaml").stdout
     assert verdict(path)[0] == "stop"
-    assert fault in refused("measure", "--withdraw", "last", "--ledger", str(path))
-    assert run("measure", "--withdraw", "last", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
+    assert fault in refused("measure", "G", "--withdraw", "--ledger", str(path))
+    assert run("measure", "G", "--withdraw", "--ledger", str(path), "--config", "mine.yaml").exit_code == 0
     for verb in (("acknowledge",), ("reset", "A"), ("reset", "A", "--undo")):
         assert fault in refused(*verb, "--ledger", str(path))
     assert verdict(path)[0] == "stop"
@@ -166,71 +166,38 @@ def test_a_stop_by_a_limit_of_the_leg_is_not_judged_by_another_one(run, refused,
 def test_an_alarm_by_a_measurement_that_was_wrong_clears_once_it_is_withdrawn_and_acknowledged(run, ledger):
     kept = ("--ledger", str(ledger))
     run("measure", "G", "0.7", "--sigma", "0.02", *kept)
-    run("measure", "G", "--withdraw", "last", *kept)
+    run("measure", "G", "--withdraw", *kept)
     assert verdict(ledger)[0] == "stop"  # until somebody has seen to it
     assert run("acknowledge", *kept).stdout == "cleared: clearance G; still present: none\n"
     assert verdict(ledger)[0] != "stop"
-
-
-def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
-    before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
-    arguments = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
-    dry = run(*arguments, "--dry-run")
-    assert {path.name: path.read_bytes() for path in ledger.parent.iterdir()} == before
-    assert (dry.exit_code, dry.stderr) == (0, "")
-    assert dry.stdout.splitlines()[-1] == "dry run: nothing was written"
-    assert dry.stdout.splitlines()[:-1] == run(*arguments).stdout.splitlines()
-
-
-def test_a_dry_run_creates_no_ledger_and_names_the_one_that_is_damaged_and_not_its_copy(
-    run, refused, tmp_path
-):
-    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {ledger.path: new.ledger}}")
-    arguments = ("measure", "A", "0.3", "--sigma", "0.005", "--dry-run")
-    assert run(*arguments, "--config", "mine.yaml").exit_code == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
-    (tmp_path / "new.ledger").write_bytes(b"no ledger" * 100)
-    assert refused(*arguments, "--config", "mine.yaml").startswith("error: new.ledger: ")
-    assert {path.name for path in tmp_path.iterdir()} == {"mine.yaml", "new.ledger"}
 
 
 def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     kept = ("--ledger", str(ledger))
     first = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
     run("measure", "B", "0.31", "--sigma", "0.005", *kept)
-    assert "withdrawn" in run("measure", "--withdraw", "1", "--dry-run", *kept).stdout
-    assert "withdrawn" not in run("measure", "--list", *kept).stdout
-    shown = run("measure", "A", "--withdraw", "last", *kept)
+    shown = run("measure", "A", "--withdraw", *kept)
     assert (shown.exit_code, shown.stderr) == (0, "")
-    assert shown.stdout.startswith("1: A 0.42 mm ± 0.005 mm, 20")
-    assert ", withdrawn 20" in shown.stdout
+    assert shown.stdout.startswith("A: 0.42 mm ± 0.005 mm, entered 20")
+    assert shown.stdout.endswith(", is withdrawn\n")
     assert len(rows(ledger)) == 2
-    listed = run("measure", "--list", *kept).stdout.splitlines()
-    assert [line.split(":")[0] for line in listed] == ["1", "2"]
-    assert "withdrawn" in listed[0]
-    assert listed[1].endswith(", counts")
     # the next one is judged as the first was
     again = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
     assert again.stdout.splitlines()[:3] == first.stdout.splitlines()[:3]
     assert again.stdout.splitlines()[3].startswith("1 of 2 measured clearances")
-    assert run("measure", "--withdraw", "3", *kept).exit_code == 0
+    assert run("measure", "A", "--withdraw", *kept).exit_code == 0
 
 
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (("--withdraw", "last"), "no measurement can be withdrawn"),
-        (("A", "--withdraw", "last"), "no measurement of joint A can be withdrawn"),
-        (("--withdraw", "7"), "'7' is not last, nor a measurement (none)"),
-        (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
-        (("--withdraw", "1", "--list"), "cannot be combined"),
-        (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
-        (("A", "--withdraw", "1", "--accept"), "nor used with MM, --sigma or --accept"),
-        (("--list", "--accept"), "nor used with MM, --sigma or --accept"),
-        (("knee", "--withdraw", "last"), "no measurement of joint G can be withdrawn"),
-        (("neck", "--list"), "'neck' is not a clearance joint"),
-        (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
-        ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+        (("A", "--withdraw"), "no measurement of joint A can be withdrawn"),
+        (("A", "0.4", "--withdraw"), "cannot be combined with MM, --sigma or --accept"),
+        (("A", "--withdraw", "--accept"), "cannot be combined with MM, --sigma or --accept"),
+        (("knee", "--withdraw"), "no measurement of joint G can be withdrawn"),
+        (("neck", "--withdraw"), "'neck' is not a clearance joint"),
+        (("A", "0.4"), "expected JOINT MM --sigma MM, or JOINT --withdraw"),
+        ((), "Missing argument 'JOINT'"),
         (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
     ],
 )
@@ -241,9 +208,7 @@ def test_what_cannot_be_withdrawn_is_one_line(refused, ledger, arguments, fault)
 def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, ledger):
     kept = ("--ledger", str(ledger))
     run("measure", "knee", "0.37", "--sigma", "0.01", *kept)
-    assert run("measure", "A", "--list", *kept).stdout == "no clearance was measured yet\n"
-    assert run("measure", "knee", "--list", *kept).stdout.startswith("1: G 0.37 mm")
-    assert run("measure", "knee", "--withdraw", "last", *kept).stdout.startswith("1: G 0.37 mm")
+    assert run("measure", "knee", "--withdraw", *kept).stdout.startswith("G: 0.37 mm")
 
 
 def test_a_ledger_has_to_be_named(refused):
@@ -264,8 +229,7 @@ def test_of_a_file_for_two_legs_a_section_is_chosen_by_its_node(run, refused, wo
     chosen = ("--config", "two.yaml", "--node", "/right/leg_wear_monitor")
     assert [run(*verb, *chosen).exit_code for verb in verbs] == [0, 0, 0]
     assert [row[0] for row in rows(ledgers["right"])] == ["A"]
-    assert run("measure", "--list", *chosen).stdout.startswith("1: A 0.42 mm")
-    assert run("measure", "--withdraw", "last", *chosen).exit_code == 0
+    assert run("measure", "A", "--withdraw", *chosen).stdout.startswith("A: 0.42 mm")
     assert not ledgers["left"].exists()
 
 

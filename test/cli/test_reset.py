@@ -113,13 +113,6 @@ def test_what_a_reset_has_cleared_is_raised_again_once_it_is_undone(run, ledger)
     assert (now.state, now.fault_code, now.joints) == (stopped.state, stopped.fault_code, stopped.joints)
 
 
-def test_a_dry_run_leaves_the_ledger_as_it_is(run, ledger):
-    before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
-    result = run("reset", "G", "--ledger", str(ledger), "--dry-run")
-    assert result.stdout.splitlines()[-1] == "dry run: nothing was written"
-    assert {path.name: path.read_bytes() for path in ledger.parent.iterdir()} == before
-
-
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [

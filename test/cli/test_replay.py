@@ -2,13 +2,11 @@
 
 import html
 import json
-import random
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from spoilt_json import spoilt
 
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.state import Level, State
@@ -24,11 +22,6 @@ SECONDS, RATE_HZ = 4, 200
 N = SECONDS * RATE_HZ
 STAMPS = 1_700_000_000 * 10**9 + np.arange(N, dtype=np.int64) * (10**9 // RATE_HZ)
 TURNING = 2.0 * np.pi * np.arange(N) / RATE_HZ
-# what a changed summary is called: no mapping at all, or by the key at fault, or not fit for a page
-SPOILT = re.compile(
-    r"error: out/summary\.json: (.{1,60} is not a mapping of keys$|([\w ]+\.)*[\w ]+: .+"
-    r"|is not what a replay of this version writes)"
-)
 
 
 def write(path, stamps, angle):
@@ -108,20 +101,13 @@ def test_a_value_in_another_unit_is_doubted(run, bag, complaints, tmp_path):
     assert line.startswith(f"warning: {config}: wear_coefficients_per_pa: 2e-07 1/Pa, usual are below")
 
 
-def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, unpainted):
-    run("replay", str(bag), "--out", "out")
-    file, draw, refused = tmp_path / "out" / "summary.json", random.Random(16), 0
-    whole = json.loads(file.read_text())
-    texts = [json.dumps(spoilt(whole, draw)) for _ in range(10)]
-    for text in [*texts, "", "[]", "{", "7", "[" * 100_000, '{"a": NaN}', '"\\ud800"']:
-        file.write_text(text)
-        result = run("report", "out")
-        lines = result.stderr.splitlines()
-        assert (result.exit_code, len(lines)) in {(0, 0), (2, 1)}, text
-        if lines:
-            refused += 1
-            assert SPOILT.match(lines[0])
-    assert refused >= 7
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", "7", '{"schema_version": 4}', '{"schema_version": 4, "joints": 1}']
+)
+def test_a_damaged_summary_is_refused_in_one_line(refused, tmp_path, text):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "summary.json").write_text(text)
+    assert refused("report", "out").startswith("error: out/summary.json: ")
 
 
 @pytest.mark.parametrize(("version", "shown"), [(1, "1"), (None, "1"), ("x" * 999, "'xxx")])

@@ -4,7 +4,6 @@ import platform
 import shutil
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from datetime import datetime
 from functools import partial
 from importlib import metadata
 from itertools import chain
@@ -338,16 +337,13 @@ def _in_full(pair: "Material") -> list[str]:
 # ``leg-wear-monitor cache``: compiled code on this machine.
 
 
-_MOST = 20  # directories that are listed: one version has about ten
-
-
-@click.command(short_help="List, fill or remove the compiled code on this machine.")
+@click.command(short_help="Measure, fill or remove the compiled code on this machine.")
 @click.option(
     "--fill", is_flag=True, help="Compile the kernels now instead of at the first start: about two minutes."
 )
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
 def cache(fill: bool, clear: bool) -> None:
-    """Print the place and the size of the compiled code, by version; or remove it, or compile it ahead.
+    """Print the place and the size of the compiled code; or remove it, or compile it ahead.
 
     After `--fill` the first simulation, replay and start of a node are as fast as later ones.
 
@@ -377,15 +373,6 @@ def cache(fill: bool, clear: bool) -> None:
         click.echo(f"removed: {_in_mb(size)} in {len(kept)} directories")
         return
     click.echo(f"total: {_in_mb(sum(map(_size, kept)))} in {len(kept)} directories")
-    for directory in sorted(kept, key=_used, reverse=True)[:_MOST]:
-        used = datetime.fromtimestamp(_used(directory)).strftime("%Y-%m-%d %H:%M")
-        click.echo(f"  {_in_mb(_size(directory)):>9}  used {used}  {directory.name}")
-    if len(kept) > _MOST:
-        click.echo(f"  and {len(kept) - _MOST} that are older")
-
-
-def _used(directory: Path) -> float:
-    return directory.stat().st_mtime
 
 
 def _size(directory: Path) -> int:

@@ -1,10 +1,6 @@
 """``leg-wear-monitor replay`` and ``report``."""
 
-import json
 import time
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +8,7 @@ import click
 
 from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, closed_on_interrupt
-from leg_wear_monitor.files import package_version
+from leg_wear_monitor.files import package_version, read_json
 from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS
 from leg_wear_monitor.state import Level, State
 
@@ -172,12 +168,6 @@ def write_replay(
 # ``leg-wear-monitor report``: the page of a run again, from its data.
 
 
-_MISMADE = (
-    ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, RuntimeWarning,
-    TypeError, ValueError,
-)  # fmt: skip
-
-
 @click.command(short_help="Write the HTML page of a run again, from its data.")
 @click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
 def report(directory: Path) -> int:
@@ -195,26 +185,8 @@ def report(directory: Path) -> int:
 def _replay(directory: Path) -> int:
     from leg_wear_monitor.recordings.result import summary_of
 
-    source = directory / common.SUMMARY
-    with _as_one_line(source):
-        record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
-        page = common.page_of(summary_of(record, str(source)))
+    source = str(directory / common.SUMMARY)
+    page = common.page_of(summary_of(read_json(source), source))
     for path in common.write_directory(directory, {common.PAGE: page}):
         click.echo(f"written: {path}")
     return 0
-
-
-def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is not JSON")
-
-
-@contextmanager
-def _as_one_line(source: Path) -> Iterator[None]:
-    """Report data that no page can be made of as a fault of the file: the run made a page of its own data."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", RuntimeWarning)  # numpy would print it and go on
-            yield
-    except _MISMADE as error:
-        fault = f"is not what a replay of this version writes ({type(error).__name__}: {error})"
-        raise ConfigError(str(source), "", fault) from error

@@ -1,8 +1,8 @@
 """The table of alarms: the value and the limit that each alarm compares."""
 
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
@@ -28,10 +28,6 @@ from leg_wear_monitor.twin import LOAD
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.monitor.gait_evidence import TorqueBounds
-    from leg_wear_monitor.monitor.input_health import InputHealth
-    from leg_wear_monitor.monitor.inputs import InputGuard
-    from leg_wear_monitor.monitor.reports import JointReport
 
 
 # The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.
@@ -40,17 +36,16 @@ if TYPE_CHECKING:
 # lists the kinds.
 
 
-_E = TypeVar("_E")
-
 DEADBAND = 0.05  # of a limit: a value at its limit must not switch the level in each gait cycle
 
 
 @attrs.frozen
 class LimitSource:
-    """Inputs of the limits: parameters, bounds of the drive torque, and the clearance joint."""
+    """Inputs of the limits: parameters, RMS of the predicted torque, largest lag, and the clearance joint."""
 
     config: "MonitorConfig"
-    bounds: "TorqueBounds"
+    torque_size_nm: float
+    max_lag_s: float
     joint: int = 0
 
     @property
@@ -61,7 +56,7 @@ class LimitSource:
 
 
 @attrs.frozen(kw_only=True)
-class AlarmSpec(Generic[_E]):
+class AlarmSpec:
     """An alarm.
 
     Attributes
@@ -99,7 +94,7 @@ class AlarmSpec(Generic[_E]):
     quantity: str
     meaning: str
     limit_words: str
-    value: Callable[[_E], float] = attrs.field()
+    value: Callable[[Any], float] = attrs.field()
     limit: Callable[[LimitSource], float]
     is_immediate: bool = False
     is_least: bool = False
@@ -140,7 +135,7 @@ def _constant(limit: float, words: str = "") -> dict[str, Any]:
     return {"limit_words": words or f"{limit:g}", "limit": lambda _: limit}
 
 
-IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
+IMPACT = AlarmSpec(
     kind="impact_force",
     unit="N",
     quantity="peak contact force",
@@ -152,7 +147,7 @@ IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     is_immediate=True,  # the next impact may break the joint
     figure=Figure.IMPACT_FORCES,
 )
-CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
+CLEARANCE = AlarmSpec(
     kind="clearance",
     unit="m",
     quantity="mean radial clearance",
@@ -162,7 +157,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     limit=lambda of: of.clearance_m,
     figure=Figure.CLEARANCES,
 )
-GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
+GROWTH = AlarmSpec(
     kind="growth",
     unit="m/h",
     quantity="growth of the mean radial clearance",
@@ -171,7 +166,7 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
     figure=Figure.GROWTH,
 )
-LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
+LIFE = AlarmSpec(
     kind="remaining_life",
     unit="h",
     quantity="p10 of the remaining life",
@@ -181,7 +176,7 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     is_least=True,
     figure=Figure.FORECAST,
 )
-MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
+MATERIAL = AlarmSpec(
     kind="material_limit",
     quantity="load over the limits of the material",
     meaning="largest of pressure (99th percentile), sliding speed and p v (means) of the gait cycle, as a "
@@ -189,7 +184,7 @@ MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
     **_constant(1.0, "1, the limits of the material"),
     value=lambda joint: or_nan(joint.load.fraction if joint.load else None),
 )
-DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
+DEPARTURE = AlarmSpec(
     kind="clearance_departure",
     unit="m",
     quantity="difference between the clearance from encoders and the modelled clearance",
@@ -198,7 +193,7 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     **_constant(1.0e-4, "0.1 mm"),  # a third of a new clearance
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
 )
-MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
+MISMATCH = AlarmSpec(
     kind="torque_mismatch",
     quantity="unexplained fraction of the drive torque",
     meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
@@ -209,7 +204,7 @@ MISMATCH: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     # once
     far=1.5,
 )
-CADENCE: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
+CADENCE = AlarmSpec(
     kind="cadence",
     unit="rpm",
     quantity="departure from the commanded cadence",
@@ -217,7 +212,7 @@ CADENCE: "AlarmSpec[Mapping[str, float]]" = AlarmSpec(
     limit_words="`cadence.tolerance_rpm`",
     limit=lambda of: of.config.cadence.tolerance_rpm,
 )
-SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
+SOURCES = AlarmSpec(
     kind="input_sources",
     quantity="number of sources of the crank angle",
     meaning="number of sources of the crank angle",
@@ -226,9 +221,9 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     is_count=True,
 )
 
-JOINT: "tuple[AlarmSpec[JointReport], ...]" = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
+JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
-TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
+TORQUE = (
     MISMATCH,
     AlarmSpec(
         kind=BIAS,
@@ -237,7 +232,7 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         meaning="constant drive torque that friction cannot cause, N m: it drives, or exceeds 0.3 of the "
         "predicted RMS",
         limit_words="0.1 of the predicted RMS",
-        limit=lambda of: of.bounds.bias_nm,
+        limit=lambda of: 0.1 * of.torque_size_nm,
     ),
     AlarmSpec(
         kind=DRIFT,
@@ -245,7 +240,7 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         quantity="change of the constant drive torque since commissioning",
         meaning="change of the constant drive torque since this leg was commissioned, N m",
         limit_words="0.15 of the predicted RMS",
-        limit=lambda of: of.bounds.drift_nm,
+        limit=lambda of: 0.15 * of.torque_size_nm,
     ),
     AlarmSpec(
         kind=LAG,
@@ -253,13 +248,13 @@ TORQUE: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
         quantity="delay of the measured torque",
         meaning="delay of the measured torque, late or early, s",
         limit_words="5 ms, and the declared lag and low-pass of the drive",
-        limit=lambda of: of.bounds.max_lag_s,
+        limit=lambda of: of.max_lag_s,
     ),
 )
 GAIT = (CADENCE,)
 
 
-def _rate(name: str) -> "AlarmSpec[InputHealth]":
+def _rate(name: str) -> AlarmSpec:
     """Rate of the used samples of a kind, by the kind's name."""
     return AlarmSpec(
         kind="input_rate",
@@ -287,7 +282,7 @@ def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any
 
 
 FOOT_LOAD_RATE = _rate(SAMPLE_KINDS[LOAD].name)
-FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
+FOOT_LOAD = (
     _foot_load(
         GAPS,
         "fraction of time without samples of the foot load",
@@ -323,7 +318,7 @@ FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
     ),
 )
 
-INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
+INPUT = (
     *(_rate(kind.name) for code, kind in SAMPLE_KINDS.items() if code != LOAD),
     AlarmSpec(
         kind="input_samples",
@@ -349,20 +344,32 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     ),
 )
 
-OF_INPUT: "tuple[AlarmSpec[Any], ...]" = (*INPUT, SOURCES)
-OF_FOOT_LOAD: "tuple[AlarmSpec[Any], ...]" = (FOOT_LOAD_RATE, *FOOT_LOAD)
-ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
+OF_INPUT = (*INPUT, SOURCES)
+OF_FOOT_LOAD = (FOOT_LOAD_RATE, *FOOT_LOAD)
+ALL = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
 
 OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 """Names of the alarms whose values need a drive torque."""
 
+SILENCE, AHEAD = "input_silence", "stamps_ahead"
+"""Kinds of alarms of the node, which has a clock."""
+
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
-KINDS: "dict[str, AlarmSpec[Any]]" = {spec.kind: spec for spec in ALL}
+KINDS = {spec.kind: spec for spec in ALL}
 """The kinds of alarms, each with a spec: alarms of one kind have the same unit and figure."""
 
 
 QUANTITIES = {
     **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
     **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},
+    **{
+        f"{alarm} {kind.name}": noun.format(kind.name)
+        for kind in SAMPLE_KINDS.values()
+        for alarm, noun in (
+            (SILENCE, "time without {} samples"),
+            (AHEAD, "lead of the {}'s stamps over the clock"),
+            (SOURCES.kind, "number of publishers of the {}"),
+        )
+    },
 }
-"""Nouns by the alarm's name; by its kind for an alarm of a joint."""
+"""Nouns by the alarm's name; by its kind for an alarm of a joint. The last ones are alarms of the node."""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from typing import Any
 
 import attrs
 import numpy as np
@@ -14,7 +13,6 @@ from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, LimitSource
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.gait_evidence import torque_bounds
 from leg_wear_monitor.monitor.input_health import (
     InputHealth,
     TorqueRange,
@@ -24,7 +22,7 @@ from leg_wear_monitor.monitor.input_health import (
     with_torques,
 )
 from leg_wear_monitor.monitor.inputs import InputGuard
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.situation import is_observed
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -37,18 +35,18 @@ from leg_wear_monitor.twin.statistics import Intake, Tracking
 _NO_SOURCES: Mapping[str, tuple[float, str]] = {}
 
 
-def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec[JointReport], ...]:
+def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec, ...]:
     """Specs of the alarms of each clearance joint."""
     return (*alarm_specs.JOINT, *(alarm_specs.ENCODERS if config.encoders.names else ()))
 
 
 def specs_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...]
-) -> Iterator[tuple[AlarmSpec[Any], int, Alarm]]:
+) -> Iterator[tuple[AlarmSpec, int, Alarm]]:
     """Specs of all alarms in their order, each with the number of its joint and its initial alarm."""
     for k, joint in enumerate(clearance_joints):
         yield from ((spec, k, spec.new(joint)) for spec in joint_specs(config))
-    of_leg: tuple[AlarmSpec[Any], ...] = (*alarm_specs.TORQUE, *alarm_specs.GAIT, *alarm_specs.OF_INPUT)
+    of_leg: tuple[AlarmSpec, ...] = (*alarm_specs.TORQUE, *alarm_specs.GAIT, *alarm_specs.OF_INPUT)
     of_leg += alarm_specs.OF_FOOT_LOAD if config.foot_load.source != NO_LOAD else ()
     yield from ((spec, 0, spec.new()) for spec in of_leg)
 
@@ -57,9 +55,9 @@ def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
-    bounds = torque_bounds(torque_size_nm, largest_lag_s(config))
+    lag_s = largest_lag_s(config)
     return {
-        alarm.name: spec.limits(LimitSource(config, bounds, k))
+        alarm.name: spec.limits(LimitSource(config, torque_size_nm, lag_s, k))
         for spec, k, alarm in specs_of(config, clearance_joints)
     }
 

@@ -276,40 +276,25 @@ class MismatchWindow:
 
 # fractions of the predicted torque's RMS, if the parameters are 0: joints and gears lose some tenths of the
 # transmitted torque; a tenth is also the limit of the torque residual
-_FRICTION, _BIAS, _DRIFT = 0.3, 0.1, 0.15
+MAX_FRICTION = 0.3  # of the RMS of the predicted torque: a larger constant torque is a bias
 _SURE = 3.0  # standard deviations
 
 
-@attrs.frozen
-class TorqueBounds:
-    """Bounds of a drive: largest friction and lag, and limits of the excess and of a drift."""
-
-    max_friction_nm: float
-    max_lag_s: float
-    bias_nm: float
-    drift_nm: float
-
-
-def torque_bounds(size_nm: float, max_lag_s: float) -> TorqueBounds:
-    """Bounds from the RMS of the predicted torque [N m], and the largest lag."""
-    return TorqueBounds(_FRICTION * size_nm, max_lag_s, _BIAS * size_nm, _DRIFT * size_nm)
-
-
-def torque_values(report: CycleReport, record: TorqueRecord, bounds: TorqueBounds) -> dict[str, float]:
+def torque_values(report: CycleReport, record: TorqueRecord, max_friction_nm: float) -> dict[str, float]:
     """Values of the alarms in their units, 0 unless significant (three sigma); empty without a torque."""
     if not report.torque_samples:
         return {}
-    bias, drift = _bias(report, bounds), _drift(report, record)
+    bias, drift = _bias(report, max_friction_nm), _drift(report, record)
     lag = NamedCause(Cause.LAG, report.torque_lag_s, report.torque_lag_sigma_s)
     return {name: _surely(one) for name, one in ((BIAS, bias), (DRIFT, drift), (LAG, lag))}
 
 
 def torque_causes(
-    raised: set[str], report: CycleReport, record: TorqueRecord, bounds: TorqueBounds
+    raised: set[str], report: CycleReport, record: TorqueRecord, max_friction_nm: float
 ) -> dict[str, NamedCause]:
     """Cause of each alarm of the torque that is raised."""
     causes = {
-        BIAS: _bias(report, bounds),
+        BIAS: _bias(report, max_friction_nm),
         DRIFT: _drift(report, record),
         LAG: _timing(report),
     }
@@ -322,8 +307,8 @@ def _surely(one: NamedCause) -> float:
     return beyond if not beyond < 0.0 else 0.0
 
 
-def _bias(report: CycleReport, bounds: TorqueBounds) -> NamedCause:
-    return beyond_friction(report.friction_nm, report.friction_sigma_nm, bounds.max_friction_nm)
+def _bias(report: CycleReport, max_friction_nm: float) -> NamedCause:
+    return beyond_friction(report.friction_nm, report.friction_sigma_nm, max_friction_nm)
 
 
 def _drift(report: CycleReport, record: TorqueRecord) -> NamedCause:

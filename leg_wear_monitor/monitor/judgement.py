@@ -26,7 +26,8 @@ from leg_wear_monitor.monitor.verdict.situation import (
     joint_status,
     surest,
 )
-from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, dated, has_changed, verdict_of
+from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
+from leg_wear_monitor.monitor.verdict.verdict import dated, has_changed, verdict_of
 from leg_wear_monitor.state import (
     Figure,
     JointClearance,
@@ -98,7 +99,6 @@ def situation_of(leg: MonitoredLeg) -> Situation:
     return Situation(
         joints=_joint_situations(leg),
         alarms=tuple(alarms.values()),
-        quantities=alarm_specs.QUANTITIES,
         has_cycle=last is not None,
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,

@@ -251,7 +251,7 @@ def note_verdict(leg: MonitoredLeg, stamp_ns: int, milder: bool = True) -> None:
         update_verdict(leg)
         return
     now = situation_of(leg)
-    known = Situation(joints=now.joints, alarms=now.alarms, quantities=now.quantities, mismatch=math.nan)
+    known = Situation(joints=now.joints, alarms=now.alarms, mismatch=math.nan)
     verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), leg.accounting.ledger.verdict
     if milder or last is None or verdict.state.severity >= last.state.severity:
         leg.accounting.note(VerdictEvent(stamp_ns, verdict))

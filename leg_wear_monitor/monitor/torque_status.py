@@ -12,7 +12,8 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, 
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import TorqueRecord, offset_error_rad
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.verdict.causes import CAUSES, explanation, sentence
+from leg_wear_monitor.monitor.verdict.causes import explanation, sentence
+from leg_wear_monitor.monitor.verdict.table import words_of_cause
 from leg_wear_monitor.monitor.verdict.verdict import diagnosis_words, with_unit
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared
@@ -120,7 +121,7 @@ def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
     """Values of the first explanation of a torque residual, and the remaining residual."""
     values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
     for one in explained.alternatives[0] if explained.alternatives else ():
-        row = CAUSES[one.cause]
+        row = words_of_cause(one.cause)
         name = f"{row.name}_{one.subject}".rstrip("_")
         values |= {with_unit(name, row.unit): one.value, with_unit(f"{name}_sigma", row.unit): one.sigma}
     return values

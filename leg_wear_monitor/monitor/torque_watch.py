@@ -22,10 +22,9 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import (
+    MAX_FRICTION,
     MismatchWindow,
-    TorqueBounds,
     TorqueRecord,
-    torque_bounds,
     torque_causes,
     torque_values,
 )
@@ -144,7 +143,7 @@ class TorqueWatch(Observer):
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
         """Torque residual, bias, drift and lag of a gait cycle, by the names of their alarms."""
-        values = torque_values(report, self.record, self._bounds)
+        values = torque_values(report, self.record, self._max_friction_nm)
         if self._leg.config.cadence.allows(report.cadence_rpm):
             values[MISMATCH.kind] = report.torque_mismatch
         return {spec.name(): spec.value(values) for spec in TORQUE}
@@ -350,19 +349,18 @@ class TorqueWatch(Observer):
         return None if explained and self.diagnosis.contradicts(explained) else explained
 
     @property
-    def _bounds(self) -> TorqueBounds:
-        config = self._leg.config
-        return torque_bounds(self._leg.twin.torque_size_nm, largest_lag_s(config))
+    def _max_friction_nm(self) -> float:
+        return MAX_FRICTION * float(self._leg.twin.torque_size_nm)
 
     @property
     def _allowed(self) -> Allowed:
         """Which torque a leg without a fault may have."""
-        limits, bounds = self._leg.config.limits, self._bounds
+        config = self._leg.config
         return Allowed(
-            lag_s=bounds.max_lag_s,
+            lag_s=largest_lag_s(config),
             loads_n=self._leg.twin.settings.loads_n,
-            friction_nm=bounds.max_friction_nm,
-            unexplained=WARN_FRACTION * limits.torque_mismatch,
+            friction_nm=self._max_friction_nm,
+            unexplained=WARN_FRACTION * config.limits.torque_mismatch,
         )
 
     @property
@@ -371,7 +369,7 @@ class TorqueWatch(Observer):
         alarms, last = self._board.alarms, self._leg.last
         names = {spec.name() for spec in TORQUE}
         present = {name for name in names if alarms[name].present is not Level.OK}
-        return torque_causes(present, last, self.record, self._bounds) if last else {}
+        return torque_causes(present, last, self.record, self._max_friction_nm) if last else {}
 
     @property
     def leg_fields(self) -> Mapping[str, Any]:

@@ -8,6 +8,7 @@ from typing import TypeVar
 import attrs
 
 from leg_wear_monitor.monitor import alarm_specs, alarms
+from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
 from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.inputs import Inbox, InputTopic, refusals, several
@@ -122,7 +123,6 @@ class Silence:
 # Alarms that need a clock or the ROS graph: a silent input, stamps of a time to come, several publishers.
 
 
-SILENCE, AHEAD = "input_silence", "stamps_ahead"
 AHEAD_FROM_S = 1.0  # larger than the usual clock differences within a network
 _SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S, is_latched=False)
 _AHEAD = Limit(AHEAD_FROM_S, 2.0 * AHEAD_FROM_S, is_latched=False)
@@ -130,14 +130,6 @@ SOURCES = alarm_specs.SOURCES.kind
 _TWO_SOURCES = Limit(2.0, 2.0)
 _CRANK = KINDS[CRANK].name
 _LIMITS = {SILENCE: _SILENT, AHEAD: _AHEAD, SOURCES: _TWO_SOURCES}
-
-QUANTITIES = {
-    **{f"{SILENCE} {kind.name}": f"time without {kind.name} samples" for kind in KINDS.values()},
-    **{f"{AHEAD} {kind.name}": f"lead of the {kind.name}'s stamps over the clock" for kind in KINDS.values()},
-    **{f"{SOURCES} {kind.name}": f"number of publishers of the {kind.name}" for kind in KINDS.values()},
-    SOURCES: f"number of publishers of the {_CRANK}",
-}
-"""Nouns of the alarms' values, by the alarms' names."""
 
 
 def sources_alarm(kind: str) -> Alarm:

@@ -9,6 +9,7 @@ import attrs
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.judgement import leg_alarm
@@ -205,7 +206,7 @@ class Supervision:
         own, monitors = self._alarms.raised, report.findings
         if self._other_axis:
             monitors = tuple(map(self._with_axis, monitors))
-        found = findings(Situation(alarms=own, quantities=health.QUANTITIES)) if own else ()
+        found = findings(Situation(alarms=own)) if own else ()
         if not found and monitors == report.findings:
             return report
         return attrs.evolve(report, findings=(*monitors, *dated(found, (), report.stamp_ns)))
@@ -236,8 +237,8 @@ class Supervision:
         values = self._check_topics(now_ns)
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
-            values[f"{health.SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
-            values[f"{health.AHEAD} {kind}"] = self._ahead_s[kind]
+            values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
+            values[f"{AHEAD} {kind}"] = self._ahead_s[kind]
         self._most_ahead_s = max(self._ahead_s.values())
         self._ahead_s = dict.fromkeys(self._ahead_s, 0.0)
         changed = self._alarms.evaluate(values, stamp_ns)

@@ -20,8 +20,8 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
 from leg_wear_monitor.monitor.ledger.rows import FORMAT, TABLES, create_tables
-from leg_wear_monitor.monitor.verdict.decision import measured_figures
-from leg_wear_monitor.monitor.verdict.rules import RULES
+from leg_wear_monitor.monitor.verdict.table import rules
+from leg_wear_monitor.monitor.verdict.table import table as verdict_table
 from leg_wear_monitor.studies.study import Study, Sweep
 
 ROOT = Path(__file__).parents[2]
@@ -214,8 +214,8 @@ def of_monitor(name: str) -> str:
         rows = ((f"`{name}`", spec.meaning, spec.limit_words) for name, spec in names)
         return table("alarm | value | limit", rows)
     rows = (
-        (f"`{rule.code}`", rule.state.value, ", ".join(figure.value for figure in rule.not_valid))
-        for rule in RULES
+        (f"`{code}`", rule.state.value, ", ".join(figure.value for figure in rule.not_valid))
+        for code, rule in rules().items()
     )
     return table("`fault_code` | state | values that are not valid", rows)
 
@@ -225,14 +225,14 @@ def certainty(_name: str) -> str:
         source = one.source.replace("docs/explanation/", "").replace("docs/", "../")
         return one.counted, one.words, one.where, one.date, f"[results]({source})"
 
-    return table("right | what | measured on | date |", map(row, measured_figures().values()))
+    return table("right | what | measured on | date |", map(row, verdict_table().measured.values()))
 
 
 def meanings() -> Iterator[tuple[str, str]]:
     """Each code with a line for each place that reports it."""
-    for rule in RULES:
-        yield rule.code, f"- Verdict *{rule.state.words}*: {in_words(rule.why)}."
-    with_a_rule = {rule.code for rule in RULES}
+    for rule_code, rule in rules().items():
+        yield rule_code, f"- Verdict *{rule.state.words}*: {in_words(rule.why)}."
+    with_a_rule = set(rules())
     for alarm in (*OF_A_JOINT, *OF_THE_LEG):
         code = alarm.name("").strip().upper().replace(" ", "_")
         if code in with_a_rule:

@@ -5,10 +5,18 @@ from collections.abc import Callable, Mapping, Sequence
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, Alarm, amount, joint_of, time_words
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause
+from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
+from leg_wear_monitor.monitor.alarms import (
+    ADVICE,
+    CAUSES_OF_ALARMS,
+    Alarm,
+    amount,
+    joint_of,
+    time_words,
+)
 from leg_wear_monitor.monitor.diagnosis.state import DiagnosisState
-from leg_wear_monitor.monitor.verdict.causes import CAUSES, evidence_of, explanation, remedy, sentence
+from leg_wear_monitor.monitor.verdict.causes import evidence_of, explanation, remedy, sentence
 from leg_wear_monitor.monitor.verdict.situation import (
     ACTS,
     BOTH,
@@ -20,9 +28,10 @@ from leg_wear_monitor.monitor.verdict.situation import (
     Situation,
     at_limit_by_estimate,
 )
+from leg_wear_monitor.monitor.verdict.table import words_of_cause
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Evidence, Figure, Level, State
-from leg_wear_monitor.twin import TORQUE
+from leg_wear_monitor.twin import KINDS, TORQUE
 
 
 @attrs.frozen(kw_only=True)
@@ -52,6 +61,8 @@ class Hit:
     state: State = State.HEALTHY
 
 
+_TORQUE = KINDS[TORQUE].name
+
 Condition = Callable[[Situation], Sequence[Hit]]
 
 
@@ -70,7 +81,7 @@ def has_fault(code: str) -> Condition:
 # Conditions on alarms. A latched alarm counts like a present one until an operator acknowledges it.
 
 
-def raised(*kinds: str, least: Level = Level.WARN, most: Level = Level.ERROR) -> Condition:
+def raised(*kinds: str, least: Level = Level.ERROR, most: Level = Level.ERROR) -> Condition:
     """Alarms of some kinds (all if none is given) between two levels."""
     return lambda situation: [
         hit_of(alarm, situation)
@@ -123,7 +134,8 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
         past = f", {amount(alarm.value, alarm.unit)} now"
     if not is_present:
         past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
-    own, noun = joint_of(alarm.name), situation.quantity(alarm)
+    own = joint_of(alarm.name)
+    noun = QUANTITIES.get(alarm.name) or QUANTITIES.get(alarm.kind) or alarm.name.replace("_", " ")
     joint = situation.joint_words(own)
     evidence = [Evidence(alarm.name, value, alarm.limit, alarm.unit)]
     each = next((each for each in situation.joints if each.joint == own and alarm.kind == "clearance"), None)
@@ -165,7 +177,7 @@ def _explained(code: str, situation: Situation) -> list[Hit]:
     explained = situation.explained
     if explained is None or not explained.named or explained.named[0].cause.fault_code != code:
         return []
-    alarms = raised("torque_mismatch")(situation)
+    alarms = raised("torque_mismatch", least=Level.WARN)(situation)
     return [
         Hit(
             words={
@@ -183,12 +195,12 @@ def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
     """Alarms of a bias, a drift or a lag beyond its bounds."""
     kinds = [kind for kind, cause in CAUSES_OF_ALARMS.items() if cause.fault_code == code]
     hits = []
-    for hit in raised(*kinds, least=Level.ERROR)(situation) if kinds else ():
+    for hit in raised(*kinds)(situation) if kinds else ():
         alarm = hit.evidence[0].name  # the evidence of a raised alarm is the alarm's value, by its name
         cause = situation.torque_causes.get(alarm)
         words = ": the {quantity} is {value} (limit {limit}){past}".format(**hit.words)
         words += f"; {sentence(cause, situation.diagnosis)}" if cause else ""
-        do = remedy(cause) if cause else CAUSES[CAUSES_OF_ALARMS[alarm]].do
+        do = remedy(cause) if cause else words_of_cause(CAUSES_OF_ALARMS[alarm]).do
         hits.append(attrs.evolve(hit, words={"causes": words, "remedy": do}, state=State.INSPECT))
     return hits
 
@@ -212,7 +224,7 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
 def load_not_observed(situation: Situation) -> Sequence[Hit]:
     """The drive torque does not fit the model on the ground, and the force of the ground is not known."""
     is_unknown = situation.diagnosis.is_load_unknown
-    return raised("torque_mismatch", least=Level.ERROR)(situation) if is_unknown else []
+    return raised("torque_mismatch")(situation) if is_unknown else []
 
 
 def mismatch(situation: Situation) -> Sequence[Hit]:
@@ -224,7 +236,7 @@ def mismatch(situation: Situation) -> Sequence[Hit]:
     causes = f"; possible cause: {'; '.join(possible)}" if possible else ""
     if situation.explained is not None:
         causes = f"; {explanation(situation.explained, situation.diagnosis)}{causes}"
-    found = raised("torque_mismatch", least=Level.ERROR)(situation)
+    found = raised("torque_mismatch")(situation)
     return [attrs.evolve(hit, words={**hit.words, "causes": causes}) for hit in found]
 
 
@@ -266,7 +278,7 @@ def doubt(situation: Situation) -> str:
 CONFIRMED_CYCLES = 20  # gait cycles of a new part; a different leg is found in fewer
 
 
-def believed_at_limit(situation: Situation) -> Sequence[Hit]:
+def estimated_at_limit(situation: Situation) -> Sequence[Hit]:
     """Joints whose best estimate in the forecast, measurements included, is at its limit."""
     return [
         Hit(
@@ -283,7 +295,7 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
     ]
 
 
-def counted_at_limit(situation: Situation) -> Sequence[Hit]:
+def modelled_at_limit(situation: Situation) -> Sequence[Hit]:
     """Alarms of modelled or measured clearances at their limit.
 
     The forecast is valid only if it has the joint at its limit as well: not with a measurement that it does
@@ -300,7 +312,7 @@ def _forecast_m(each: JointSituation) -> float:
     return each.best_estimate_m if each.is_used or each.is_measurement_used else each.modelled_m
 
 
-def seen_at_limit(situation: Situation) -> Sequence[Hit]:
+def detected_at_limit(situation: Situation) -> Sequence[Hit]:
     """Joints whose clearance estimate by encoders or the drive torque is or was surely at the limit.
 
     The estimate stays until an operator acknowledges it, or a measurement contradicts it.
@@ -312,7 +324,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
         if seen is None:
             continue
         raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
-        if seen.by == "torque" and not situation.is_trusted((TORQUE,), raised_ns):
+        if seen.by == "torque" and not situation.is_trusted(_TORQUE, raised_ns):
             continue
         past, unsure = doubt(situation) if seen.by == "torque" else "", ""
         if seen not in each.seen:
@@ -355,29 +367,29 @@ def departing(situation: Situation) -> Sequence[Hit]:
     used = {each.joint for each in situation.joints if each.is_used}
     return [
         hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
-        for hit in raised("clearance_departure", least=Level.ERROR)(situation)
+        for hit in raised("clearance_departure")(situation)
     ]
 
 
 def diagnosed(situation: Situation) -> Sequence[Hit]:
     """Clearances that changed according to the drive torque, without a correction."""
-    found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
-    several = (change for change in changes(situation) if change.cause is Cause.SEVERAL)
-    return [
-        *(_clearance_hit(change, situation, doubt(situation)) for change in found),
-        *(hit for change in several for hit in _hits_of_several(change, situation)),
-    ]
+    found = [one for one in changes(situation) if one.cause in (Cause.CLEARANCE, Cause.SEVERAL)]
+    return [hit for change in found for hit in _clearance_hits(change, situation, doubt(situation))]
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
     """Changes that corrected modelled clearances."""
     found = (change for change in situation.diagnosis.changes if change.is_corrected)
-    return [_clearance_hit(change, situation) for change in found]
+    return [hit for change in found for hit in _clearance_hits(change, situation)]
 
 
-def _hits_of_several(change: Change, situation: Situation) -> list[Hit]:
-    """Joints that explain a change together, in the same words."""
-    words = {"change": f"{words_of(change, situation)}{doubt(situation)}"}
+def _clearance_hits(change: Change, situation: Situation, addition: str = "") -> list[Hit]:
+    """A changed clearance with the measurement of its joint, or joints that explain a change together."""
+    joints: Sequence[NamedCause] = change.joints if change.cause is Cause.SEVERAL else (change,)
+    measured = next((each.measured for each in situation.joints if each.joint == change.subject), None)
+    if measured is not None and measured.words not in addition:
+        addition += f"; {measured.words} was measured"
+    words = {"change": f"{words_of(change, situation)}{addition}"}
     return [
         Hit(
             words=words,
@@ -385,22 +397,8 @@ def _hits_of_several(change: Change, situation: Situation) -> list[Hit]:
             since_ns=change.since_ns,
             evidence=(Evidence(f"clearance {one.subject} by torque", one.value, math.nan, "m"),),
         )
-        for one in change.joints
+        for one in joints
     ]
-
-
-def _clearance_hit(change: Change, situation: Situation, addition: str = "") -> Hit:
-    """A changed clearance in words, with an addition and the measurement of that joint."""
-    own = (each.measured for each in situation.joints if each.joint == change.subject)
-    measured = next(own, None)
-    if measured is not None and measured.words not in addition:
-        addition += f"; {measured.words} was measured"
-    return Hit(
-        words={"change": f"{words_of(change, situation)}{addition}"},
-        joint=change.subject,
-        since_ns=change.since_ns,
-        evidence=(Evidence(f"clearance {change.subject} by torque", change.value, math.nan, "m"),),
-    )
 
 
 # Conditions on the motion and on the observation of the joints.
@@ -413,7 +411,7 @@ def no_cycle(situation: Situation) -> Sequence[Hit]:
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:
     """The cadence is outside of its tolerance, or was for so long that its alarm is raised."""
-    notes, alarms = situation.notes.get("CADENCE", ()), raised("cadence", least=Level.ERROR)(situation)
+    notes, alarms = situation.notes.get("CADENCE", ()), raised("cadence")(situation)
     if not notes and not alarms:
         return []
     cause = notes[0] if notes else "it walked at a different one for several gait cycles"
@@ -478,7 +476,8 @@ _LEAST_REST = 0.01  # fraction of the drive torque: below it, noise and toleranc
 def nothing_found(situation: Situation) -> Sequence[Hit]:
     """Always holds; it decides if no other rule holds."""
     if not situation.has_torque or math.isnan(situation.mismatch):
-        return [Hit(words={"observed": "the encoders agree with the modelled clearances"})]
+        words = {"observed": "the encoders agree with the modelled clearances", "advice": ADVICE}
+        return [Hit(words=words)]
     rest, limit, found = situation.mismatch, situation.mismatch_limit, situation.diagnosis
     observed = [
         "the drive torque agrees with the model of this leg: "
@@ -493,4 +492,4 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
         observed.append(f"{found.cycles} gait cycles show {since} to ± {amount(max(known), 'm')}")
     observed += filter(None, (found.next_step,))
     evidence = (Evidence("torque_mismatch", rest, limit, ""),)
-    return [Hit(words={"observed": "; ".join(observed)}, evidence=evidence)]
+    return [Hit(words={"observed": "; ".join(observed), "advice": ADVICE}, evidence=evidence)]

@@ -12,6 +12,7 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.input_health import InputFault
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
+from leg_wear_monitor.twin import KINDS
 
 # All inputs of a verdict; the defaults describe a leg without a fault.
 
@@ -104,8 +105,6 @@ class Situation:
     ----------
     joints : tuple of JointSituation
     alarms : tuple of Alarm
-    quantities : mapping of str to str
-        Noun of each alarm's value, by the alarm's name; by its kind for an alarm of a joint.
     has_cycle : bool
         Whether a whole gait cycle was monitored in this run.
     has_torque : bool
@@ -131,7 +130,6 @@ class Situation:
 
     joints: tuple[JointSituation, ...] = ()
     alarms: tuple[Alarm, ...] = ()
-    quantities: Mapping[str, str] = attrs.field(factory=dict)
     has_cycle: bool = True
     has_torque: bool = True
     mismatch: float = 0.0
@@ -153,20 +151,15 @@ class Situation:
         """Joints with their labels."""
         return ", ".join(map(self.joint_words, joints))
 
-    def is_trusted(self, kinds: Sequence[int], since_ns: int) -> bool:
-        """Whether a case began before any fault of the streams that show it."""
-        ends_ns = [self.trusted_before_ns[kind] for kind in kinds if kind in self.trusted_before_ns]
+    def is_trusted(self, kind: str, since_ns: int) -> bool:
+        """Whether a case began before a fault of the samples that show it, by the name of their kind."""
+        ends_ns = [end_ns for code, end_ns in self.trusted_before_ns.items() if KINDS[code].name == kind]
         return all(0 < since_ns < end_ns for end_ns in ends_ns)
 
     def alarm_of(self, joint: str) -> Alarm | None:
         """The alarm of a joint's clearance; None if it is not listed."""
         own = (each for each in self.alarms if each.kind == "clearance" and each.subject == joint)
         return next(own, None)
-
-    def quantity(self, alarm: Alarm) -> str:
-        """Noun of an alarm's value; its name where there is none."""
-        noun = self.quantities.get(alarm.name) or self.quantities.get(alarm.kind)
-        return noun or alarm.name.replace("_", " ")
 
     @property
     def unobserved(self) -> tuple[str, ...]:

@@ -7,9 +7,9 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms import amount, guide_of
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 
-NO_GAIT_CYCLE, NONE = "NO_GAIT_CYCLE", "NONE"
 _TIMING = "TORQUE_TIMING"
 
 

@@ -4,14 +4,11 @@ import attrs
 import pytest
 
 from leg_wear_monitor.monitor.verdict.decision import (
-    ADVICE,
     HOW_SURE,
-    NOT_MEASURED,
     decision_of,
     figures_of,
-    measured_figures,
 )
-from leg_wear_monitor.monitor.verdict.rules import RULES
+from leg_wear_monitor.monitor.verdict.table import rules, table
 from leg_wear_monitor.state import FootLoad, JointClearance, LegState, State, TorqueDiagnosis, Verdict
 
 
@@ -30,9 +27,8 @@ def state(code: str, by: str = "torque", on_ground: bool = False, doubt: str = "
 
 
 def test_every_rule_has_its_columns_and_every_measured_value_is_cited() -> None:
-    assert {rule.code for rule in RULES} == set(ADVICE)
-    assert {name for advice in ADVICE.values() for name in advice.measured} == set(measured_figures())
-    for code in ADVICE:
+    assert {name for rule in rules().values() for name in rule.measured} == set(table().measured)
+    for code in rules():
         assert all(text for _, text in decision_of(state(code)))
 
 
@@ -55,8 +51,10 @@ def test_every_rule_has_its_columns_and_every_measured_value_is_cited() -> None:
 )
 def test_a_measured_value_is_cited_only_for_a_leg_that_meets_its_conditions(code, conditions, cited) -> None:
     leg = state(code, **conditions)
-    assert figures_of(leg) == tuple(measured_figures()[name] for name in cited)
-    assert (dict(decision_of(leg))[HOW_SURE] == NOT_MEASURED) == (not cited and code != "CLEARANCE")
+    assert figures_of(leg) == tuple(table().measured[name] for name in cited)
+    assert (dict(decision_of(leg))[HOW_SURE] == table().how_sure["not_measured"]) == (
+        not cited and code != "CLEARANCE"
+    )
 
 
 def test_without_a_comparison_of_the_torque_no_opening_is_promised() -> None:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.mechanism.position import carriers, corners
-from leg_wear_monitor.mechanism.reach import DeadPoint, Reach, reach_of
+from leg_wear_monitor.mechanism.reach import Reach, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
 from leg_wear_monitor.report.figure import (
     BODY_COLOURS,
@@ -56,19 +56,9 @@ def draw_leg(axes: Axes, reach: Reach, shown: int, clearance_joints: Collection[
         if reach.is_open(name):
             ends = [reach.path(body, name)[shown] for body in carriers(mechanism, name)]
             axes.plot(*np.array(ends).T, "--", color=VERMILION, linewidth=1.8)
-    for i, dead in in_line(reach):
-        if i == shown:
-            line = [reach.path(mechanism.sides(joint)[1], joint)[i] for joint in dead.joints]
-            axes.plot(*np.array(line).T, "--", color=VERMILION, linewidth=1.8)
     if mechanism.toe is not None:
         axes.plot(*reach.path(*mechanism.toe).T, "--", color=INK, linewidth=1.0, label="path of the toe")
     axes.set_aspect("equal", adjustable="datalim")
-
-
-def in_line(reach: Reach) -> list[tuple[int, DeadPoint]]:
-    """Numbers of the positions, including the dead points, that have three joints in line."""
-    ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
-    return [(i, dead) for i, dead in ends if dead and dead.is_in_line and not reach.open_joint]
 
 
 def leg_picture(mechanism: Mechanism, joints: Collection[str]) -> Figure:

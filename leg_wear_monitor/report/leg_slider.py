@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.position import carriers, corners, is_on_ground, point_path, rotated
-from leg_wear_monitor.mechanism.reach import DeadPoint, Reach, dead_words
+from leg_wear_monitor.mechanism.position import carriers, corners, is_on_ground, rotated
+from leg_wear_monitor.mechanism.reach import Reach
 from leg_wear_monitor.mechanism.spec import GROUND
 from leg_wear_monitor.report.figure import BODY_COLOURS
-from leg_wear_monitor.report.leg_picture import in_line
 from leg_wear_monitor.report.page import Fragment, render, template_text
 
 
@@ -22,7 +21,7 @@ def leg_slider(reach: Reach, first: int, caption: str) -> Fragment:
 
 
 def leg_data(reach: Reach) -> dict[str, Any]:
-    """Data of the picture: bodies, joints, path of the toe, open joints, and joints in line."""
+    """Data of the picture: bodies, joints, path of the toe, and open joints."""
     mechanism = reach.mechanism
     every = [
         reach.path(body, point)
@@ -36,7 +35,7 @@ def leg_data(reach: Reach) -> dict[str, Any]:
     corner = 1.0e3 * np.array([low[0] - margin, -high[1] - margin])
     size = 1.0e3 * (high - low + 2.0 * margin)
     ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
-    said = {i: f"Dead point: {dead_words(dead)}." for i, dead in ends if dead and not reach.open_joint}
+    said = {i: "Dead point: the crank cannot pass it." for i, dead in ends if dead and not reach.open_joint}
     return {
         "bodies": sorted(_bodies(reach), key=lambda body: -float(np.ptp(body["outline"], axis=0).sum())),
         "joints": [_joint(reach, name) for name in mechanism.joints],
@@ -44,7 +43,6 @@ def leg_data(reach: Reach) -> dict[str, Any]:
         "toe": [] if mechanism.toe is None else _millimetres(reach.path(*mechanism.toe)),
         "angles": np.rad2deg(reach.crank_angle).round(1).tolist(),
         "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
-        "marks": [_mark(reach, dead, i) for i, dead in in_line(reach)],
         "said": said,
         "frames": len(reach.q),
     }
@@ -77,15 +75,6 @@ def _joint(reach: Reach, name: str) -> dict[str, Any]:
             "gap_mm": [float(f"{1.0e3 * gap:.3g}") for gap in reach.gap_of(name)],
         }
     return joint
-
-
-def _mark(reach: Reach, dead: DeadPoint, frame: int) -> dict[str, Any]:
-    """Line through the three joints that are in line at a dead point."""
-    places = [
-        point_path(reach.mechanism, dead.q[None], reach.mechanism.sides(joint)[1], joint)[0]
-        for joint in dead.joints
-    ]
-    return {"frame": frame, "line": _millimetres(np.array(places))}
 
 
 def _millimetres(points: Floats) -> list[list[float]]:

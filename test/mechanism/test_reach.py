@@ -1,14 +1,10 @@
 """How far a mechanism closes and turns, against closed forms of the four-bar and the slider-crank."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms
-from leg_wear_monitor.mechanism.position import TURN, point_path
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.reach import findings, headline, loop_of, reach_of
 
 CRANK, COUPLER, ROCKER, BASE = 0.1, 0.2, 0.15, 0.3
@@ -38,14 +34,6 @@ def corner(a, b, opposite):
     return np.arccos((a**2 + b**2 - opposite**2) / (2.0 * a * b))
 
 
-def in_line(found, dead):
-    """Sine of the angle between the two lines through the three joints."""
-    body = {joint: found.mechanism.sides(joint)[1] for joint in dead.joints}
-    places = [point_path(found.mechanism, dead.q[None], body[joint], joint)[0] for joint in dead.joints]
-    first, second = places[1] - places[0], places[2] - places[1]
-    return (first[0] * second[1] - first[1] * second[0]) / np.hypot(*first) / np.hypot(*second)
-
-
 @pytest.mark.parametrize("name", shipped_mechanisms())
 def test_a_shipped_mechanism_closes_and_turns(name):
     found = reach_of(load_mechanism(name))
@@ -57,25 +45,19 @@ def test_a_shipped_mechanism_closes_and_turns(name):
     assert headline(found) == "closes, and the crank turns through"
 
 
-def test_a_crank_that_rocks_has_coupler_and_rocker_in_line_at_both_ends(rocking):
+def test_a_crank_that_rocks_turns_until_coupler_and_rocker_are_in_line(rocking):
     found = reach(rocking())
     end = corner(CRANK, BASE, COUPLER + ROCKER)
     assert not found.turns
     assert (found.low.crank_angle, found.high.crank_angle) == pytest.approx((-end, end), abs=4e-4)
-    for dead in (found.low, found.high):
-        assert dead.is_in_line and not dead.is_folded
-        assert (set(dead.bodies), dead.joints[1]) == ({"coupler", "rocker"}, "C")
-        assert {dead.joints[0], dead.joints[2]} == {"B", "D"}
-        assert abs(in_line(found, dead)) < 0.1
     assert found.crank_angle[0] == found.low.crank_angle
     assert (np.diff(found.crank_angle) > 0.0).all()
-    lines = findings(found)
-    assert lines[0] == "drive.body: crank turns only from -112.0 deg to 112.0 deg, 224.0 of 360 deg"
-    assert lines[1].startswith("dead point at crank angle -112.0 deg: ")
-    assert "in line, stretched" in lines[1]
+    (line,) = findings(found)
+    assert line.startswith("drive.body: crank turns only from -112.0 deg to 112.0 deg, 224.0 of 360 deg, ")
+    assert line.endswith("between two dead points")
 
 
-def test_a_folded_end_is_told_from_a_stretched_one(rocking):
+def test_a_range_ends_where_the_bodies_are_folded(rocking):
     """With a base of 130 mm, B comes as near to D as coupler and rocker folded: 50 mm."""
     folded = rocking(base=0.13)
     folded["assembly"] = {
@@ -85,20 +67,6 @@ def test_a_folded_end_is_told_from_a_stretched_one(rocking):
     found = reach(folded)
     end = corner(CRANK, 0.13, COUPLER - ROCKER)
     assert found.low.crank_angle == pytest.approx(end, abs=4e-4)
-    assert found.low.is_folded
-
-
-def test_each_end_of_a_leg_has_its_own_bodies_in_line():
-    """A Klann leg whose rod is 30 % longer to the lower rocker; upper rocker and leg are carried along."""
-    lesson = Path(__file__).parents[2] / "docs" / "tutorials" / "2_your_linkage.py"
-    klann = re.search(r'KLANN = """(.*?)"""', lesson.read_text(), re.DOTALL)[1]
-    made = YAML(typ="safe").load(klann)
-    crank_pin, rocker_pin = (np.array(made["bodies"]["rod"]["points"][name]) for name in "BD")
-    made["bodies"]["rod"]["points"]["D"] = (crank_pin + 1.3 * (rocker_pin - crank_pin)).tolist()
-    found = reach(made)
-    assert (set(found.low.bodies), found.low.is_folded) == ({"rod", "lower_rocker"}, True)
-    assert (set(found.high.bodies), found.high.is_folded) == ({"leg", "upper_rocker"}, False)
-    assert max(abs(in_line(found, dead)) for dead in (found.low, found.high)) < 0.1
 
 
 def test_a_rod_shorter_than_the_crank_stands_at_a_right_angle_to_its_guide(document):
@@ -107,8 +75,6 @@ def test_a_rod_shorter_than_the_crank_stands_at_a_right_angle_to_its_guide(docum
     short["assembly"]["slider"] = [0.09, 0.0, 0.0]
     found = reach(short)
     assert np.sin(found.high.crank_angle) == pytest.approx(0.04 / 0.05, abs=1e-3)
-    assert (found.high.bodies, found.high.joints) == (("rod",), ("B", "S"))
-    assert "rod is at a right angle to the guide of joint S" in findings(found)[-1]
 
 
 def test_an_asked_angle_is_among_those_of_the_result(rocking, document):

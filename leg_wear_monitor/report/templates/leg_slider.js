@@ -46,10 +46,6 @@
       joints[joint.name].end = add(svg, "circle", { r: 1.1 * unit, fill: PAPER, stroke: VERMILION, "stroke-width": 0.6 * unit });
     }
   });
-  const inLine = data.marks.map((mark) => ({
-    frame: mark.frame,
-    path: add(svg, "path", { d: line(mark.line, false), fill: "none", stroke: VERMILION, "stroke-width": 0.9 * unit, "stroke-dasharray": 2 * unit })
-  }));
   // A letter stands on the side of its joint that is away from the joints near it.
   function placeLetter(joint, index) {
     const here = joint.path[index];
@@ -93,7 +89,6 @@
         words.push("Joint " + name + " is open by " + open.gap_mm[index] + " mm.");
       }
     }
-    inLine.forEach((mark) => mark.path.setAttribute("visibility", mark.frame === index ? "visible" : "hidden"));
     if (data.said[index]) words.push(data.said[index]);
     said.textContent = words.join(" ");
     root.dataset.frame = index;
@@ -107,7 +102,7 @@
     return frame + way;
   }
 
-  if (data.marks.length || data.joints.some((joint) => joint.other)) said.hidden = false;
+  if (Object.keys(data.said).length || data.joints.some((joint) => joint.other)) said.hidden = false;
   if (slider) {
     slider.addEventListener("input", () => show(Number(slider.value)));
     play.addEventListener("click", () => {

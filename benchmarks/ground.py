@@ -40,7 +40,7 @@ from leg_wear_monitor.twin import TORQUE as TORQUE_KIND
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import GROUND, MEASURED, STANCE, WRENCH, TwinSettings, gait_samples
+from leg_wear_monitor.twin.sample import GROUND, MEASURED, NONE, WRENCH, TwinSettings, gait_samples
 
 PEAKS_N = (100.0, 300.0, 600.0)
 BEFORE, HEALTHY, WORN, COUNTED, FORCE_HZ = 600, 260, 40, 60, 200
@@ -214,12 +214,12 @@ def main() -> None:
             one, found = watched(leg, size, rows, one, BEFORE)
             print(f"  healthy, {options.hours:g} h: {summary(found) or 'none'}", flush=True)
             if name == "none":
-                for what, known, shape in (
-                    ("none", None, STANCE),
+                for what, known, model in (
+                    ("none", None, NONE),
                     ("ground, before the fit", None, GROUND),
                     ("ground", parameters, GROUND),
                 ):
-                    ratios = wear(peak_n, known, TwinSettings(load_shape=shape))
+                    ratios = wear(peak_n, known, TwinSettings(load_model=model))
                     print(f"  wear, load.model {what}: {ratios}", flush=True)
         load = LoadConfig(ground_n=peak_n, shape=options.shape)
         for of_value, of_peak in ((0.0, 0.0), (0.05, 0.0), (0.0, 0.05)):

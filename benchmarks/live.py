@@ -53,7 +53,7 @@ from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.ros.gait_publisher import PublisherConfig, sensor_message
 from leg_wear_monitor.ros.running import spin
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
-from leg_wear_monitor.twin.sample import TrackerSettings
+from leg_wear_monitor.twin.sample import REORDER_WINDOW_S, TrackerSettings
 
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR
@@ -179,10 +179,10 @@ def beyond_lag_s(stamps: np.ndarray, delays: np.ndarray) -> np.ndarray:
     shortest wait waits for no node.
     """
     tracker = TrackerSettings()
-    bins = np.floor((stamps - stamps.min()) / (2.0 * tracker.node_interval)).astype(int)
+    bins = np.floor((stamps - stamps.min()) / (2.0 * tracker.knot_interval_s)).astype(int)
     least = np.full(bins.max() + 1, np.inf)
     np.minimum.at(least, bins, delays)
-    return least[1:-1][np.isfinite(least[1:-1])] - tracker.lag - tracker.reorder_window_s
+    return least[1:-1][np.isfinite(least[1:-1])] - tracker.lag_s - REORDER_WINDOW_S
 
 
 def used(pid: int) -> tuple[float, float]:

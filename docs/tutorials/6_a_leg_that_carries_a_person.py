@@ -104,7 +104,7 @@ for name, life in (("in the air", in_air), ("by duty", by_day)):
 # Three parameters say what the leg carries:
 #
 # - ``load.model: ground`` if nothing measures the force at the foot: the monitor estimates it from the drive torque, as the stance of a person.
-# - ``load.model: measured`` and ``foot_load.source`` if there is an insole or a force plate: the monitor takes the force at its time.
+# - ``load.model: measured`` and ``foot_load.source`` if there is an insole or a force plate: the mean of the last ten gait cycles acts.
 # - ``load.person_kg`` if a person's leg hangs on the linkage; it should be right to 20 %.
 #
 # Without them a leg on the ground is told as such, with the load that it seems to carry and the parameter that is missing.

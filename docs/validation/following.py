@@ -75,7 +75,7 @@ def main() -> None:
 
 def loaded(mechanism: Mechanism) -> None:
     """Print what a load at the toe does, with and without its estimate at work."""
-    angle, impulse, growth = walk(13, LoadConfig(toe_force_n=60.0, friction_nm=1.0))
+    angle, impulse, growth = walk(13, LoadConfig(ground_n=60.0, friction_nm=1.0))
     for acts in (True, False):
         twin = DigitalTwin(mechanism, TwinSettings(estimate_load=acts))
         cycles = twin.update(seen(angle, impulse, 1.0e-3, 200, 0.0)).cycles

@@ -22,7 +22,14 @@ from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, Samples, TrackerSettings
+from leg_wear_monitor.twin.sample import (
+    BRIDGE_LIMIT_S,
+    GAIT_SAMPLE,
+    GATE_RAD,
+    NO_FAULT,
+    Samples,
+    TrackerSettings,
+)
 from leg_wear_monitor.twin.tracker import LARGEST_ANGLE
 
 # Restarts of the crank's encoder: places where its angle does not continue, in the order of arrival.
@@ -198,10 +205,10 @@ class CrankZero(Observer):
 
     def __init__(self, model: TorqueModel, config: MonitorConfig, tracker: TrackerSettings) -> None:
         self._model, self._config = model, config
-        self._gap_s = tracker.bridge_limit_s
+        self._gap_s = BRIDGE_LIMIT_S
         self._settings = new_records(1, SETTINGS)
         speed = tracker.commanded_speed_radps
-        self._settings[0] = tracker.gate_rad, tracker.largest_speed, self._gap_s, speed
+        self._settings[0] = GATE_RAD, tracker.largest_speed, self._gap_s, speed
         self._series = new_records(1, STATE)
         self._event: Record = record_of(self._series)
         self.state = CrankZeroState()

@@ -36,7 +36,7 @@ from leg_wear_monitor.state import FootLoad, Level
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.follower_state import FINE_PHASES
 from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples
-from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile
+from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile, means_by_phase
 
 _CYCLES = 10  # gait cycles over which the load is averaged
 _LEAST_CYCLES = 3  # gait cycles from which on the sensor is checked
@@ -105,7 +105,7 @@ class FootLoadCheck(Observer):
         )
         self._load_acts = float(config.load.model == MEASURED)
         self._cycles: tuple[_Cycle, ...] = ()
-        self._acted = self._load_acts  # `_Cycle.acted` of the present gait cycle
+        self._acted = 0.0  # `_Cycle.acted` of the present gait cycle; at first no mean is known
         self._largest_n = 0.0  # largest force received since the last gait cycle, unusable values included
         self._is_missing = False  # whether the last gait cycle had no sample
         self._is_frozen = False  # whether the samples do not act
@@ -139,7 +139,7 @@ class FootLoadCheck(Observer):
         self._largest_n, self._is_missing = 0.0, load is None
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
-        force = _means_by_phase(load.number, load.force_n)
+        force = means_by_phase(load.number, load.force_n)
         cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), self._acted)
         self._cycles = (*self._cycles, cycle)[-_CYCLES:]
         stuck = _stuck_fraction(load)
@@ -172,7 +172,7 @@ class FootLoadCheck(Observer):
             return "no load acts: the modelled wear on the ground is too small"
         if self._is_frozen:
             return "the mean load of earlier gait cycles acts"
-        return "the samples themselves act"
+        return "the mean load of the last gait cycles acts"
 
     @property
     def load(self) -> FootLoad:
@@ -305,19 +305,10 @@ class FootLoadCheck(Observer):
         return min(1.0 / shown, 1.0e3) if 0.0 < shown < 1.0 - 2.0 * sigma else 1.0
 
 
-def _means_by_phase(number: Floats, sums: Floats) -> Floats:
-    """Means (m, n) by phase of sums (m, n); empty phases are interpolated."""
-    there = np.flatnonzero(number)
-    if not len(there):
-        return np.full(sums.shape, math.nan)
-    n = len(number)
-    return np.array([np.interp(np.arange(n), there, one[there] / number[there], period=n) for one in sums])
-
-
 def _unexplained(profile: TorqueProfile) -> Floats:
     """Measured minus predicted drive torque (n,) by phase [N m]; NaN without measured ones."""
     unexplained = (profile.measured_nm - profile.predicted_nm)[None]
-    return np.asarray(_means_by_phase(profile.number, unexplained)[0])
+    return np.asarray(means_by_phase(profile.number, unexplained)[0])
 
 
 def _stuck_fraction(load: LoadProfile) -> float:

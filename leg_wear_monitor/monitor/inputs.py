@@ -7,7 +7,9 @@ import numpy as np
 from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (
+    BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
+    GATE_RAD,
     NO_FAULT,
     OUT_OF_RANGE,
     Samples,
@@ -265,10 +267,10 @@ class InputGuard:
 
     def __init__(self, settings: TrackerSettings, size_nm: float) -> None:
         self._commanded = abs(settings.commanded_speed_radps)
-        gap, speed = settings.bridge_limit_s, settings.commanded_speed_radps
+        gap, speed = BRIDGE_LIMIT_S, settings.commanded_speed_radps
         alone = max(_ALONE_S, gap)
         self._settings = new_records(1, SETTINGS)
-        self._settings[0] = settings.gate_rad, settings.largest_speed, gap, alone, speed, size_nm
+        self._settings[0] = GATE_RAD, settings.largest_speed, gap, alone, speed, size_nm
         self._states = new_records(1, STATE)
         self._state: Record = record_of(self._states)
 

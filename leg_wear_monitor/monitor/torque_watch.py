@@ -36,7 +36,7 @@ from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.sample import LOADS_N, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
 
 _LOG = logging.getLogger(__name__)
@@ -358,7 +358,7 @@ class TorqueWatch(Observer):
         config = self._leg.config
         return Allowed(
             lag_s=largest_lag_s(config),
-            loads_n=self._leg.twin.settings.loads_n,
+            loads_n=LOADS_N,
             friction_nm=self._max_friction_nm,
             unexplained=WARN_FRACTION * config.limits.torque_mismatch,
         )

@@ -8,8 +8,8 @@ import math
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.twin import CRANK, LOAD
+from leg_wear_monitor.twin.sample import GATE_RAD
 from leg_wear_monitor.twin.steps import (
-    AHEAD_NS,
     EVALUATE,
     LEAVE,
     LOST_BY_OUTLIERS,
@@ -23,6 +23,17 @@ from leg_wear_monitor.twin.steps import (
     STOPPED,
     add_step,
     join_smoothly,
+)
+from leg_wear_monitor.twin.tracker_state import (
+    ACQUIRE_NS,
+    ANGLE_NOISE,
+    JERK,
+    LONGEST_SPREAD,
+    RUN_UP_NS,
+    SETTLE_NS,
+    STOP_HOLD_NS,
+    VELOCITY_GATE,
+    VELOCITY_NOISE,
 )
 
 # Kalman filter and modified Bryson-Frazier smoother of the crank's motion (physics.md section 9).
@@ -43,17 +54,17 @@ def begin_filter(model, angle, out_estimate):
     """Initialise the estimate by a first angle [rad], reduced to [0, 2 pi), and the commanded speed."""
     e, speed = out_estimate, model.commanded_speed
     e.angle, e.speed, e.acceleration = angle - _TURN * math.floor(angle / _TURN), speed, 0.0
-    e.p00, e.p01, e.p02 = model.angle_noise / model.longest_spread, 0.0, 0.0
-    e.p11, e.p12, e.p22 = speed**2, 0.0, (speed / model.longest_spread) ** 2
+    e.p00, e.p01, e.p02 = ANGLE_NOISE / LONGEST_SPREAD, 0.0, 0.0
+    e.p11, e.p12, e.p22 = speed**2, 0.0, (speed / LONGEST_SPREAD) ** 2
 
 
 @kernel
-def predict(model, h, estimate):
+def predict(h, estimate):
     """Propagate the filter's state and covariance by a time h [s], in place."""
     e, x, v, a = estimate, estimate.angle, estimate.speed, estimate.acceleration
     e.angle, e.speed = x + h * (v + 0.5 * h * a), v + h * a
     p00, p01, p02, p11, p12, p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
-    q, g = model.jerk * h, 0.5 * h * h
+    q, g = JERK * h, 0.5 * h * h
     # rows of F P, F = [1 h g; 0 1 h; 0 0 1]
     a00, a01, a02 = p00 + h * p01 + g * p02, p01 + h * p11 + g * p12, p02 + h * p12 + g * p22
     a11, a12 = p11 + h * p12, p12 + h * p22
@@ -98,7 +109,7 @@ def _correct(i, variance, innovation, estimate, row):
 
 
 @kernel
-def update(model, h, step, angle, velocity, trusted, estimate, row):
+def update(h, step, angle, velocity, trusted, estimate, row):
     """Filter a crank sample (angle [rad], velocity [rad/s]) and fill its row of the queue.
 
     It is h [s] after the filter's time and ``step`` [s] after the last used sample. Its velocity is used if
@@ -110,21 +121,21 @@ def update(model, h, step, angle, velocity, trusted, estimate, row):
         Whether the sample passed its gate (otherwise the filter contains the prediction); 1 for a velocity
         that agrees with the angles, -1 for one that does not, 0 without velocity.
     """
-    predict(model, h, estimate)
+    predict(h, estimate)
     note_prediction(estimate, step, row)
     innovation = angle - estimate.angle
     innovation -= _TURN * math.floor(innovation / _TURN + 0.5)
-    if not abs(innovation) < min(_WIDEST_GATE, model.gate + _SIGMAS * math.sqrt(estimate.p00)):
+    if not abs(innovation) < min(_WIDEST_GATE, GATE_RAD + _SIGMAS * math.sqrt(estimate.p00)):
         return False, 0
-    spread = min(max(step, 1.0e-6), model.longest_spread)
-    _correct(0, model.angle_noise / spread, innovation, estimate, row)
+    spread = min(max(step, 1.0e-6), LONGEST_SPREAD)
+    _correct(0, ANGLE_NOISE / spread, innovation, estimate, row)
     if not math.isfinite(velocity):
         return True, 0
     innovation = velocity - estimate.speed
-    if not abs(innovation) < model.velocity_gate + _SIGMAS * math.sqrt(estimate.p11):
+    if not abs(innovation) < VELOCITY_GATE + _SIGMAS * math.sqrt(estimate.p11):
         return True, -1
     if trusted:
-        _correct(1, model.velocity_noise / spread, innovation, estimate, row)
+        _correct(1, VELOCITY_NOISE / spread, innovation, estimate, row)
     return True, 1
 
 
@@ -214,35 +225,17 @@ def judge_load(state, sample):
 
 
 @kernel
-def _push(state, j, steps, n):
-    """Add the step of a queued sample of the foot load, with the one that is a filter's delay ahead."""
-    row, after, ahead, newest = state.queue[j], -1, j, j
-    for k in range(j + 1, state.clock.tail):
-        if state.queue[k].kind == LOAD:
-            # the newest sample may still be an outlier
-            after, ahead, newest = k if after < 0 else after, newest, k
-            # the filtered force is then right until the next sample
-            if state.queue[ahead].stamp_ns >= state.queue[after].stamp_ns + AHEAD_NS:
-                break
-    n = add_step(steps, n, PUSH, row.stamp_ns, state.queue[ahead].stamp_ns, 0)
-    push = steps[n - 1]
-    push.until_next_ns = state.queue[after].stamp_ns - row.stamp_ns if after >= 0 else 0
-    for i in range(2):
-        push.motion[i], push.motion[2 + i] = row.foot_force[i], state.queue[ahead].foot_force[i]
-    return n
-
-
-@kernel
 def evaluate_up_to(state, spline_node, steps, n):
     """Add steps that evaluate the leg at all queued samples before an index, and drop these samples.
 
-    Samples of the foot load push it instead; those ahead have arrived within the lag.
+    Samples of the foot load push it instead.
     """
     clock = state.clock
     for j in range(clock.head, spline_node):
         row = state.queue[j]
         if row.kind == LOAD:
-            n = _push(state, j, steps, n)
+            n = add_step(steps, n, PUSH, row.stamp_ns, row.stamp_ns, 0)
+            steps[n - 1].motion[0], steps[n - 1].motion[1] = row.foot_force[0], row.foot_force[1]
             continue
         n = add_step(steps, n, EVALUATE, row.stamp_ns, row.stamp_ns, row.kind)
         steps[n - 1].torque = row.torque
@@ -270,7 +263,7 @@ def lose(state, stamp, reason, steps, n):
 def _next_spline_node(model, state):
     """Index of the next spline node in the queue; -1 if it, or a later sample that it needs, is missing."""
     clock = state.clock
-    due = clock.acquiring_ns + model.acquire_ns
+    due = clock.acquiring_ns + ACQUIRE_NS
     if clock.followed != 0:
         due = clock.last_node_ns + model.node_interval_ns
     newest = clock.last_crank_ns
@@ -303,7 +296,7 @@ def _evaluate_speed(model, clock, stamp, speed):
     within = 1 if model.slowest <= abs(speed) <= model.fastest else 0
     if clock.tolerance_since_ns == 0 or within != clock.in_tolerance:
         clock.tolerance_since_ns, clock.in_tolerance = stamp, within
-    patience = model.settle_ns
+    patience = SETTLE_NS
     if within == 0 and clock.tracking == IS_STARTING:
         patience *= _PATIENCE
     if stamp - clock.tolerance_since_ns >= patience:
@@ -323,7 +316,7 @@ def _stops(model, state, stamp, node):
         clock.slow_since_ns = 0
     elif clock.slow_since_ns == 0:
         clock.slow_since_ns = stamp
-    return clock.slow_since_ns != 0 and stamp - clock.slow_since_ns >= model.stop_hold_ns
+    return clock.slow_since_ns != 0 and stamp - clock.slow_since_ns >= STOP_HOLD_NS
 
 
 @kernel
@@ -360,7 +353,7 @@ def _move(model, state, spline_node, stamp, steps, n):
     begin = clock.last_node_ns
     if rested:
         # a rest is reported up to a run-up time before the node, to leave time for a smooth start
-        begin = max(clock.rested_ns, stamp - model.run_up_ns)
+        begin = max(clock.rested_ns, stamp - RUN_UP_NS)
         if begin > clock.rested_ns:
             state.counts.standing_ns += begin - clock.rested_ns
             n = add_step(steps, n, REST, clock.rested_ns, begin, 0)

@@ -8,6 +8,7 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.follower_state import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS
+from leg_wear_monitor.twin.sample import LOADS_N
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     LoadProfile,
@@ -124,21 +125,13 @@ def bounds(loads: tuple[float, float]) -> tuple[Floats, Floats]:
 class LoadEstimate:
     """Load [N], friction [N m], lag [s] and load friction, filtered over cycles; each is a random walk.
 
-    Parameters
-    ----------
-    limit : float
-        Largest possible load [N].
-    least : float, optional
-        Least possible load [N]; default: minus the largest.
-
     Attributes
     ----------
     state : (9,) array
         The four values, their variances, and the load that acts on the leg.
     """
 
-    def __init__(self, limit: float, least: float | None = None) -> None:
-        self._limit, self._least = limit, -limit if least is None else least
+    def __init__(self) -> None:
         self.state = np.concatenate([np.zeros(REGRESSORS), _UNKNOWN**2, np.zeros(1)])
 
     @property
@@ -159,12 +152,7 @@ class LoadEstimate:
     @property
     def room(self) -> tuple[float, float]:
         """Least and largest possible load minus the acting one [N]."""
-        return self._least - self.acting, self._limit - self.acting
-
-    def restart_load(self, load_n: float, acts: bool) -> None:
-        """Begin with a load of a different shape [N], known from a few cycles; ``acts`` as in `take`."""
-        self.values[LOAD], self.state[REGRESSORS + LOAD] = load_n, _UNKNOWN[LOAD] ** 2
-        self.state[-1] = load_n if acts else 0.0
+        return LOADS_N[0] - self.acting, LOADS_N[1] - self.acting
 
     def take(self, found: CycleEstimate, acts: bool) -> None:
         """Update by a cycle's estimate; ``acts``: whether a significant load acts on the leg."""
@@ -178,7 +166,7 @@ class LoadEstimate:
         gain = variance / (variance + found.sigma**2 + _SMALL)
         values += gain * surprise
         variance *= 1.0 - gain
-        values[LOAD] = np.clip(values[LOAD], self._least, self._limit)
+        values[LOAD] = np.clip(values[LOAD], *LOADS_N)
         values[LOAD_FRICTION] = np.clip(values[LOAD_FRICTION], 0.0, MOST_LOAD_FRICTION)
         enough = (_CEASES_BELOW if self.acting else _ACTS_ABOVE) * self.sigma[LOAD]
         self.state[-1] = values[LOAD] if acts and abs(values[LOAD]) > enough else 0.0
@@ -331,13 +319,9 @@ class RepeatingResidual:
         self.cycles = (*self.cycles, by_phase.copy())[-self._most :]
 
     def rms_nm(
-        self,
-        loads: tuple[float, float] = (-np.inf, np.inf),
-        other_m: Floats | None = None,
-        acting_n: float = 0.0,
-        tolerated_nm: Floats | None = None,
-    ) -> tuple[float, float]:
-        """RMS [N m] of the repeating residual without load, frictions and lag, and that load [N].
+        self, loads: tuple[float, float] = (-np.inf, np.inf), tolerated_nm: Floats | None = None
+    ) -> float:
+        """RMS [N m] of the repeating residual without load, frictions and lag.
 
         The squared standard error of the mean over cycles is subtracted, so that pure scatter gives 0 on
         average. NaN without enough cycles.
@@ -346,39 +330,31 @@ class RepeatingResidual:
         ----------
         loads : (float, float)
             Least and largest possible load of the residual [N].
-        other_m : (phases,) array, optional
-            Torque per newton of a load whose shape over the gait cycle differs from the assumed shape.
-        acting_n : float, optional
-            Load of the assumed shape that acted in the model, and that the other load replaces.
         tolerated_nm : (phases,) array, optional
             Torque that is tolerated up to this size, with either sign.
         """
         number = len(self.cycles)
         if number < self._least:
-            return float("nan"), float("nan")
+            return float("nan")
         sums = np.stack(self.cycles)
         seen = (sums[:, 0] > 0.0).all(axis=0)
         sums = sums[:, :, seen]
         if sums.shape[2] < _LEAST_PHASES:
-            return float("nan"), float("nan")
+            return float("nan")
         weight = sums[:, 0]
         total = sums.sum(axis=0)
         mean, rows = total[1] / total[0], total[2:] / total[0]
         if not np.isfinite(mean).all():
-            return float("inf"), float("nan")
-        there = mean
-        if other_m is not None:
-            there = mean + acting_n * rows[LOAD]
-            rows[LOAD] = other_m[seen]
+            return float("inf")
         low, high = bounds(loads)
         if tolerated_nm is not None:
             rows = np.vstack([rows, tolerated_nm[seen]])
             low, high = np.append(low, -1.0), np.append(high, 1.0)
-        values = bounded(rows @ rows.T, rows @ there, low, high)
+        values = bounded(rows @ rows.T, rows @ mean, low, high)
         fraction = weight / total[0]
         scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * number / (number - 1)
-        square = ((there - values @ rows) ** 2).mean() - scatter.mean()
-        return float(np.sqrt(max(square, 0.0))), float(values[LOAD])
+        square = ((mean - values @ rows) ** 2).mean() - scatter.mean()
+        return float(np.sqrt(max(square, 0.0)))
 
 
 def behind_low_pass(signature: Floats, phases: int, cutoff: float, speed: float, is_late: bool) -> Floats:

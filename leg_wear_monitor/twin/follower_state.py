@@ -124,16 +124,11 @@ LOAD_SUMS = np.dtype(
 )
 """Sums over the foot load samples of a gait cycle, along the axes of the mechanism."""
 
-LOAD_FILTER = np.dtype(
+LAST_LOAD = np.dtype(
     [
-        ("last_ns", "i8"),  # stamp of the last sample, 0 before the first
-        ("last", "f8", (2,)),  # its force [N]
-        ("ahead_ns", "i8"),  # stamp of the last filtered sample, 0 before the first
-        ("stages", "f8", (2, 2)),  # states of the low pass for x and y [N]
-        ("departure", "f8", (2, 2)),  # from the mean force: before the last filtered sample, and with it [N]
-        ("reaches_ns", "i8", (2,)),  # stamps at which these are right
-        ("peak_n", "f8"),  # largest vertical force of the gait cycle before
-        ("is_frozen", "i8"),  # 1 while the samples are wrong: the force of the gait cycles before acts
+        ("stamp_ns", "i8"),  # of the last sample of the foot load, 0 before the first
+        ("force", "f8", (2,)),  # its force [N]
+        ("is_frozen", "i8"),  # 1 while the samples are wrong: the mean of earlier gait cycles stays
     ]
 )
 
@@ -141,7 +136,7 @@ LEG_STATE = np.dtype(
     [
         ("motion", LEG_MOTION),
         ("load", LOAD_SUMS),
-        ("push", LOAD_FILTER),
+        ("last_load", LAST_LOAD),
         ("torque", LEG_TORQUE),
         ("low_pass", LOW_PASS),
         ("waiting", WAITING_INSTANT),

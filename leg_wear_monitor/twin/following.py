@@ -18,7 +18,7 @@ from leg_wear_monitor.twin.follower_state import (
     pass_low,
     phase_of,
 )
-from leg_wear_monitor.twin.load import LONGEST_PUSH, in_mechanism, take_push
+from leg_wear_monitor.twin.load import LONGEST_PUSH, in_mechanism, learn
 from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, PUSH, REPORT, START
 
 # Torque comparison for a sensor that samples instants instead of averages (physics.md section 9).
@@ -256,29 +256,29 @@ def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
 
 @kernel
 def _push(load, leg, polynomial, step):
-    """Take a sample of the foot load, for the motion and for the cycle's sums."""
-    motion, sums, push, n = leg.motion, leg.load, leg.push, load.axis.shape[0]
+    """Add a sample of the foot load to the sums of the gait cycle, and to the mean over gait cycles."""
+    motion, sums, last, n = leg.motion, leg.load, leg.last_load, load.axis.shape[0]
     at = min(max(step.begin_ns, motion.piece_begin_ns), motion.piece_end_ns)
-    tau, speed = 1.0e-9 * (at - motion.piece_begin_ns), 0.0
+    tau, speed, force = 1.0e-9 * (at - motion.piece_begin_ns), 0.0, step.motion
     for i in range(6, 1, -1):
         speed = speed * tau + (i - 1) * polynomial[i]
-    angle = _angle_at(polynomial, tau)
+    angle, since_ns = _angle_at(polynomial, tau), step.begin_ns - last.stamp_ns
     row = angle * (n / _TURN)
-    step.motion[0], step.motion[1] = in_mechanism(load.axis, row, step.motion[0], step.motion[1])
-    take_push(load, push, row, speed * (n / _TURN), step, step.motion)
-    since_ns = step.begin_ns - push.last_ns
-    if push.last_ns != 0 and since_ns > 1.0e9 * LONGEST_PUSH:
-        sums.gap_ns += since_ns
-    push.last_ns, up = step.begin_ns, 0.0
-    phase = phase_of(angle, sums.profile.shape[1])
+    force[0], force[1] = in_mechanism(load.axis, row, force[0], force[1])
+    if last.stamp_ns != 0:
+        if since_ns > 1.0e9 * LONGEST_PUSH:
+            sums.gap_ns += since_ns
+        elif last.is_frozen == 0 and load.learned.shape[0] > 0:
+            learn(load, row - 1.0e-9 * since_ns * speed * (n / _TURN), row, last.force, force)
+    phase, up = phase_of(angle, sums.profile.shape[1]), 0.0
     sums.profile[0, phase] += 1.0
     for c in range(2):
-        push.last[c] = step.motion[c]
-        sums.profile[1 + c, phase] += step.motion[c]
-        up += load.up[c] * step.motion[c]
+        last.force[c] = force[c]
+        sums.profile[1 + c, phase] += force[c]
+        up += load.up[c] * force[c]
     sums.least = min(sums.least, up) if sums.samples else up
     sums.largest = max(sums.largest, up) if sums.samples else up
-    sums.samples += 1
+    sums.samples, last.stamp_ns = sums.samples + 1, step.begin_ns
 
 
 @kernel

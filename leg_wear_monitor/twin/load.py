@@ -1,8 +1,7 @@
 """A foot load on the twin: its effect on the leg's tables and on the drive torque (physics.md section 9).
 
-The tables are linear in the load. The first part writes a measured force into their rows, sample by sample
-(kernels); the second one sets a load of a given shape and size, which may change with every gait cycle
-(`FootLoad`).
+The tables are linear in the load, which may change with every gait cycle: an estimated load of a given shape
+and size, or the mean of a measured force.
 """
 
 import math
@@ -14,91 +13,51 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import COARSER, Basis
-from leg_wear_monitor.dynamics.clearance.stepper import (
-    LoadedTables,
-    loaded_tables,
-    put_force,
-    under_trial_force,
-)
+from leg_wear_monitor.dynamics.clearance.basis import Basis
+from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force, under_trial_force
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_basis, build_tables
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards
-from leg_wear_monitor.mechanism.position import Linkage, one_cycle, point_motion
-from leg_wear_monitor.twin.follower_state import pass_low
-from leg_wear_monitor.twin.sample import GROUND, STANCE
-from leg_wear_monitor.twin.steps import AHEAD_NS
+from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_motion
 
-# A measured force on the toe, at each point of the leg's tables.
+# A measured force on the toe: its mean over gait cycles at each point of the leg's tables.
 #
-# The kernels take ``load``, the `LoadRows`; ``push``, the state of the force's filter, a record of
-# `follower_state.LOAD_FILTER`; and ``step``, a record of `steps.STEP` whose code is PUSH. A row is the number
-# of a point of the tables, POINTS in a turn of the crank; between two points it has a fraction.
-#
-# The tables are linear in the force at each point. A sample writes the rows that the crank passes until the
-# next sample; a row that no sample reaches keeps the force of the cycle before. White noise of a sensor would
-# wear an unloaded joint: noise of 5 % of the peak nearly four times as fast as the load itself (joint J under
-# 300 N, samples at 200 Hz, 2026-11-25). So the force that acts is the mean over gait cycles, plus the
-# filtered departure of the present cycle from it.
+# The kernels take ``load``, the `LoadRows`. A row is the number of a point of the tables, POINTS in a turn of
+# the crank; between two points it has a fraction. White noise of a sensor would wear an unloaded joint: noise
+# of 5 % of the peak nearly four times as fast as the load itself (joint J under 300 N, samples at 200 Hz). So
+# the mean over gait cycles acts, smoothed, and a small force counts as none.
 
 
-# time constant of each of the two stages of the departure's filter: they delay by the lead of the sample
-# ahead
-_STAGE_S = 0.5e-9 * AHEAD_NS
 # s: a longer time between samples is a gap; at twenty samples a second a stance has eight
 LONGEST_PUSH = 0.05
-_LEARNED = 10.0  # gait cycles over which the mean force is averaged
+_LEARNED = 10.0  # gait cycles over which the force is averaged
+_SMOOTH = 0.008  # turns: standard deviation of the window that smooths it
 # Fractions of the peak: a smaller vertical force than the first counts as none, a larger one than the second
 # acts as it is, with a smooth transition, since a jump would be an impact. Gait analysis takes 20 to 30 N as
 # the least force of a standing foot.
 _NONE, _SURE = 0.02, 0.08
-# rows written beyond the next sample: the coarsest table is interpolated up to its next row
-_MARGIN = COARSER
 
 
 class LoadRows(NamedTuple):
-    """The force at the points of the tables, and the tables that it changes.
+    """The measured force at the points of the tables.
 
     Attributes
     ----------
-    force : (N, 2) array
-        Force along the axes of the mechanism [N]; (0, 2) if no measured force acts.
     axis : (N, 2) array
         First axis of the samples' frame at each row; the second axis is a quarter turn further.
     up : (2,) array
         Unit vector upwards.
     mean : (N, 2) array
-        Mean force over gait cycles [N]; (0, 2) as `force`.
+        Mean force over gait cycles along the axes of the mechanism [N]; (0, 2) if no measured force acts.
     learned : (N,) array
         Number of gait cycles in the mean, at most 10.
-    tables : LoadedTables
     """
 
-    force: Floats
     axis: Floats
     up: Floats
     mean: Floats
     learned: Floats
-    tables: LoadedTables
-
-
-def load_rows(linkage: Linkage, tables: LoadedTables, acts: bool, is_of_foot: bool) -> LoadRows:
-    """Rows at the start: no force yet.
-
-    Parameters
-    ----------
-    linkage : Linkage
-    tables : LoadedTables
-        Tables of this linkage; the kernels change them.
-    acts : bool
-        Whether the force acts on the leg.
-    is_of_foot : bool
-        Whether the samples' frame is fixed to the toe's body instead of the ground.
-    """
-    mechanism = linkage.mechanism
-    force = np.zeros((POINTS if acts and mechanism.toe else 0, 2))
-    axis, up = _axis(linkage, is_of_foot), upwards(mechanism)
-    return LoadRows(force, axis, up, force.copy(), np.zeros(len(force)), tables)
 
 
 def _axis(linkage: Linkage, is_of_foot: bool) -> Floats:
@@ -119,27 +78,9 @@ def in_mechanism(axis, row, fx, fy):
 
 
 @kernel
-def take_push(load, push, row, rate, step, force):
-    """Let a sample of the foot load act, ``force`` (2,) [N], at a row that changes by ``rate`` [1/s].
-
-    Three parts: the mean force by phase is learned from the rows that the crank has passed; the departure
-    from it, which contains noise and the differences from step to step, is filtered; both are written into
-    the rows up to the next sample. The filter takes a sample that is ahead by its delay, so the force acts at
-    the right time.
-    """
-    if load.force.shape[0] == 0 or push.is_frozen != 0:
-        return
-    since, until = 1.0e-9 * (step.begin_ns - push.last_ns), 1.0e-9 * step.until_next_ns
-    if push.last_ns != 0 and since <= LONGEST_PUSH:
-        _learn(load, row - rate * since, row, push.last, force)
-    _filter(load, push, row + rate * 1.0e-9 * (step.end_ns - step.begin_ns), step)
-    _write(load, push, row, rate, until if until <= LONGEST_PUSH else 0.0, step.begin_ns)
-
-
-@kernel
-def _learn(load, before, row, force_before, force):
+def learn(load, before, row, force_before, force):
     """Learn the mean force of the rows between two rows, from the forces (2,) there."""
-    n, step = load.force.shape[0], 1 if row >= before else -1
+    n, step = load.learned.shape[0], 1 if row >= before else -1
     first = math.floor(before) + 1 if step > 0 else math.ceil(before) - 1
     last = math.floor(row) if step > 0 else math.ceil(row)
     for k in range(min(step * (last - first) + 1, n)):
@@ -149,93 +90,6 @@ def _learn(load, before, row, force_before, force):
         for c in range(2):
             now = force_before[c] + w * (force[c] - force_before[c])
             load.mean[i, c] += (now - load.mean[i, c]) / load.learned[i]
-
-
-@kernel
-def _filter(load, push, row, step):
-    """Filter the departure of the sample ahead, at a row, from the mean force.
-
-    At the start and after a gap it begins at 0: a force that is there at once would be an impact.
-    """
-    dt = 1.0e-9 * (step.end_ns - push.ahead_ns)
-    if dt <= 0.0:
-        return
-    fresh = push.ahead_ns == 0 or dt > LONGEST_PUSH
-    dt = 0.0 if fresh else dt
-    n, fraction, i = load.force.shape[0], 1.0 - math.exp(-dt / _STAGE_S), math.floor(row)
-    w = row - i
-    fx, fy = in_mechanism(load.axis, row, step.motion[2], step.motion[3])
-    for c in range(2):
-        mean = load.mean[i % n, c] + w * (load.mean[(i + 1) % n, c] - load.mean[i % n, c])
-        if fresh:
-            push.stages[c, 0], push.stages[c, 1], push.departure[1, c] = 0.0, 0.0, 0.0
-        push.departure[0, c] = push.departure[1, c]
-        push.departure[1, c] = pass_low(fraction, False, (fx if c == 0 else fy) - mean, push.stages[c])
-    push.reaches_ns[0] = (step.end_ns if fresh else push.ahead_ns) - AHEAD_NS
-    push.reaches_ns[1], push.ahead_ns = step.end_ns - AHEAD_NS, step.end_ns
-
-
-@kernel
-def _write(load, push, row, rate, until, stamp):
-    """Write the rows from one at a stamp on, over a time [s] and a few more.
-
-    Between steps the ground does not push, and it never pulls: a small force is none.
-    """
-    n, step = load.force.shape[0], 1 if rate >= 0.0 else -1
-    first = math.ceil(row) if step > 0 else math.floor(row)
-    last = math.floor(row + rate * until) if step > 0 else math.ceil(row + rate * until)
-    whole = float(push.reaches_ns[1] - push.reaches_ns[0])
-    for k in range(min(step * (last - first) + 1 + _MARGIN, n)):
-        at = first + step * k
-        passed = float(stamp - push.reaches_ns[0]) + (1.0e9 * (at - row) / rate if rate != 0.0 else 0.0)
-        w, i = min(max(passed / whole, 0.0), 1.0) if whole > 0.0 else 1.0, at % n
-        up = 0.0
-        for c in range(2):
-            departure = push.departure[0, c] + w * (push.departure[1, c] - push.departure[0, c])
-            load.force[i, c] = load.mean[i, c] + departure
-            up += load.up[c] * load.force[i, c]
-        stands = (
-            min(max((up / push.peak_n - _NONE) / (_SURE - _NONE), 0.0), 1.0) if push.peak_n > 0.0 else 1.0
-        )
-        # smooth from 0 to 1, the fraction of the force that acts
-        stands = stands * stands * (3.0 - 2.0 * stands) if up > 0.0 else 0.0
-        load.force[i, 0] *= stands
-        load.force[i, 1] *= stands
-        put_row(load, i)
-
-
-@kernel
-def put_row(load, row):
-    """Set the tables at a row to its force; the tables repeat the first row behind the last point."""
-    fx, fy = load.force[row, 0], load.force[row, 1]
-    for i in range(2 if row == 0 else 1):
-        at = row + i * load.force.shape[0]
-        _put(load.tables.motion, at, fx, fy)
-        _put(load.tables.reaction, at, fx, fy)
-        _put(load.tables.stored, at, fx, fy)
-        if at % COARSER == 0:
-            _put(load.tables.by_e, at // COARSER, fx, fy)
-
-
-@kernel
-def _put(table, row, fx, fy):
-    """A row of one table: its part without a force, and its parts per newton along x and y."""
-    for j in range(table.columns.shape[0]):
-        part = table.parts[0, row, j] + fx * table.parts[1, row, j] + fy * table.parts[2, row, j]
-        table.rows[row, table.columns[j]] = part
-
-
-def force_of(load: LoadRows) -> tuple[Floats, ...]:
-    """A copy of force, mean and number of cycles, for a snapshot."""
-    return load.force.copy(), load.mean.copy(), load.learned.copy()
-
-
-def set_force(load: LoadRows, force: tuple[Floats, ...]) -> None:
-    """Restore the force that `force_of` returned, and set the tables accordingly."""
-    for own, value in zip((load.force, load.mean, load.learned), force, strict=True):
-        own[:] = value
-    if len(load.force):
-        put_force(load.tables, load.force)
 
 
 # A load of a given shape and size.
@@ -253,9 +107,6 @@ class FootLoad:
     ----------
     linkage : Linkage
     contacts : ContactArrays
-    shape : str
-        Shape of the load over the gait cycle, one of `sample.LOAD_SHAPES`; a known load (`rebuild`) has
-        priority.
     is_measured, is_of_foot : bool
         Whether a measured force acts, and whether its axes are fixed to the foot.
 
@@ -263,28 +114,31 @@ class FootLoad:
     ----------
     tables : ClearanceTables
         Tables for the present load, changed in place.
-    shape : str
-        Present shape.
     signature : (N + 1,) array
         Drive torque per upward load [N m/N], zeros for a mechanism without a toe.
     rows : LoadRows
         The measured force.
+    acting_n : (N, 2) array
+        Measured or estimated force that acts, along the axes of the mechanism [N].
+    toe_m : (N, 2) array
+        Motion of the toe per radian of the crank [m]; zeros for a mechanism without a toe.
     """
 
     def __init__(
         self,
         linkage: Linkage,
         contacts: ContactArrays,
-        shape: str = STANCE,
         is_measured: bool = False,
         is_of_foot: bool = False,
     ) -> None:
         basis = build_basis(linkage, contacts, loaded=under_trial_force(linkage))
         self.tables = build_tables(linkage, contacts, basis=basis)
-        self.signature = np.zeros(POINTS + 1)
-        self._contacts, self.shape, self._load = contacts, shape, 0.0
-        self._known = np.zeros((0, 2))
-        self._measured = is_measured, is_of_foot
+        self.signature, self.acting_n = np.zeros(POINTS + 1), np.zeros((POINTS, 2))
+        self._contacts, self._load = contacts, 0.0
+        self._known, self._is_of_foot = np.zeros((0, 2)), is_of_foot
+        rows = POINTS if is_measured and linkage.mechanism.toe else 0
+        axis, up = _axis(linkage, is_of_foot), upwards(linkage.mechanism)
+        self.rows = LoadRows(axis, up, np.zeros((rows, 2)), np.zeros(rows))
         self._set_up(linkage, basis)
 
     def rebuild(self, linkage: Linkage, known: Floats) -> None:
@@ -295,79 +149,85 @@ class FootLoad:
         linkage : Linkage
             Without the load.
         known : (PHASES, 2) array
-            Force that gives the shape of the load [N], such as an identified one; (0, 2) for the shape by
-            name.
+            Force that gives the shape of the load [N], such as an identified one; (0, 2) for a person's
+            stance.
         """
-        self._known = known
-        load, self._load, measured = self._load, 0.0, force_of(self.rows)
+        self._known, load, measured = known, self._load, self.acting_n
         basis = build_basis(linkage, self._contacts, loaded=under_trial_force(linkage))
         pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(
             self.tables, build_tables(linkage, self._contacts, basis=basis), strict=True
         )
         for own, table in pairs:
             own[...] = table
+        self.rows.axis[:] = _axis(linkage, self._is_of_foot)
+        self._load, self.acting_n = 0.0, np.zeros((POINTS, 2))
         self._set_up(linkage, basis)
+        if len(self.rows.mean):
+            self._put(measured)
         self.set(load)
-        set_force(self.rows, measured)
 
     def _set_up(self, linkage: Linkage, basis: Basis) -> None:
         """Compute the effect of a load on the tables, which must be those without a load."""
-        self._linkage = linkage
-        self._shaped: dict[str, tuple[Floats, Floats]] = {}
+        self.toe_m = np.zeros((POINTS, 2))
+        if linkage.mechanism.toe:
+            self.toe_m = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *linkage.mechanism.toe)[1]
         self._loaded = loaded_tables(linkage, self._contacts, self.tables, basis)
-        self.rows = load_rows(linkage, self._loaded, *self._measured)
-        self.take_shape(self.shape)
+        known = self._known
+        known = known / (known @ self.rows.up).max() if known.size else stance_shape(linkage)
+        self._force, self.signature[:] = known, load_signature(linkage, known)
 
-    def take_shape(self, shape: str) -> None:
-        """Change the shape of the load, unless a known load gives it. The load is 0 afterwards."""
-        self.set(0.0)
-        self.shape, known = shape, self._known
-        if known.size:
-            self._force = known / (known @ upwards(self._linkage.mechanism)).max()
-            self.signature[:] = load_signature(self._linkage, self._force)
+    def _put(self, force_n: Floats) -> None:
+        self.acting_n = force_n
+        put_force(self._loaded, force_n)
+
+    def take_mean(self) -> None:
+        """Let the mean of the measured force act, smoothed; between steps the ground does not push."""
+        if not len(self.rows.mean):
+            return
+        window = np.exp(-0.5 * (TURN * _SMOOTH * np.arange(POINTS // 2 + 1)) ** 2)
+        force = np.fft.irfft(np.fft.rfft(self.rows.mean, axis=0) * window[:, None], POINTS, axis=0)
+        up = force @ self.rows.up
+        if up.max() > 0.0:
+            stands = np.clip((up / up.max() - _NONE) / (_SURE - _NONE), 0.0, 1.0)
         else:
-            self._force, self.signature[:] = self._force_and_signature(shape)
-
-    def signature_of(self, shape: str) -> Floats:
-        """Drive torque (N,) per upward load of a shape [N m/N]."""
-        return self._force_and_signature(shape)[1][:-1]
-
-    def _force_and_signature(self, shape: str) -> tuple[Floats, Floats]:
-        """Force and signature of a shape; cached, since a wrong leg model needs them in each gait cycle."""
-        if shape not in self._shaped:
-            force = load_shape(self._linkage, shape)
-            self._shaped[shape] = force, load_signature(self._linkage, force)
-        return self._shaped[shape]
+            stands = np.zeros(POINTS)
+        self._put(force * (stands**2 * (3.0 - 2.0 * stands))[:, None])
 
     @property
     def peak_n(self) -> float:
         """Largest vertical part over a gait cycle of the load that acts now [N]."""
-        rows = self.rows
-        return float((rows.force @ rows.up).max()) if len(rows.force) else self._load
+        return float((self.acting_n @ self.rows.up).max()) if len(self.rows.mean) else self._load
 
     def set(self, load: float) -> None:
         """Set the tables to a load [N], positive upwards."""
         if load != self._load:
             self._load = load
-            put_force(self._loaded, load * at_points(self._force))
+            self._put(load * at_points(self._force))
 
 
-def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
-    """Force on the toe (PHASES, 2), divided by its largest vertical part; zeros without a toe."""
+def stance_shape(linkage: Linkage) -> Floats:
+    """Force of a person's stance on the toe (PHASES, 2) over its peak; zeros without a toe that walks."""
+    try:
+        return nominal_stance(linkage).force()
+    except ConfigError:
+        return np.zeros((PHASES, 2))
+
+
+def load_shape(linkage: Linkage) -> Floats:
+    """Force on the toe (PHASES, 2) in proportion to its depth below its mean height; zeros without a toe."""
     mechanism = linkage.mechanism
     if mechanism.toe is None:
         return np.zeros((PHASES, 2))
-    if shape == GROUND:
-        return nominal_stance(linkage).force()
     up = upwards(mechanism)
-    position, _, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *mechanism.toe)
-    return np.outer(_load_fraction(position @ up, shape), up)
+    height = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *mechanism.toe)[0] @ up
+    depth = np.maximum(0.0, height.mean() - height)
+    return np.outer(depth / (depth.max() or 1.0), up)
 
 
 def shape_torque(linkage: Linkage) -> float:
     """RMS difference of steps from the template, in drive torque per newton of the peak [N m/N]."""
     toe = linkage.mechanism.toe
-    if toe is None:
+    if toe is None or not stance_shape(linkage).any():
         return 0.0
     stance = nominal_stance(linkage)
     _, velocity, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *toe)
@@ -407,11 +267,3 @@ def at_points(force: Floats) -> Floats:
 def torque_size(linkage: Linkage, speed: float) -> float:
     """RMS of the ideal linkage's drive torque [N m] over a turn, at a crank speed [rad/s]."""
     return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
-
-
-def _load_fraction(height: Floats, shape: str) -> Floats:
-    """Fraction (n,) of the full load at equal crank steps, from the toe's height (n,) [m]."""
-    if shape != STANCE:
-        return np.ones(len(height))
-    depth = np.maximum(0.0, height.mean() - height)
-    return np.asarray(depth / (depth.max() or 1.0))

@@ -179,6 +179,15 @@ class LoadProfile:
     force_n: Floats
 
 
+def means_by_phase(number: Floats, sums: Floats) -> Floats:
+    """Means (m, n) by phase of sums (m, n); empty phases are interpolated."""
+    there = np.flatnonzero(number)
+    if not len(there):
+        return np.full(sums.shape, np.nan)
+    n = len(number)
+    return np.array([np.interp(np.arange(n), there, one[there] / number[there], period=n) for one in sums])
+
+
 @attrs.frozen(eq=False)
 class CycleStatistics:
     """Statistics of one complete gait cycle, from crank angle 0 to the next 0.

@@ -8,8 +8,6 @@ from leg_wear_monitor.compiled.kernel import Records, kernel, new_records
 # following; report an event only; push the foot at a sample of its load.
 START, MOVE, REST, EVALUATE, LEAVE, REPORT, PUSH = range(7)
 
-AHEAD_NS = 20_000_000  # PUSH: delay of the filter of the foot load, which takes samples by so much earlier
-
 # Reasons of LEAVE, then events of REPORT.
 LOST_IN_GAP, LOST_BY_OUTLIERS, LOST_BY_OVERFLOW, LOST_BY_JUMP = range(4)
 STOPPED, MOVING, REVERSED = range(4, 7)
@@ -22,10 +20,8 @@ STEP = np.dtype(
         ("detail", "i8"),  # EVALUATE: kind of the sample; LEAVE: reason; REPORT: event
         ("turns", "i8"),  # whole crank turns to add to the angle of the motion
         ("bridged_ns", "i8"),  # part of its duration that bridges a gap
-        ("until_next_ns", "i8"),  # PUSH: time to the next sample, 0 if none has arrived
         ("torque", "f8"),  # drive torque measured at a sample [N m]
-        # START: angle [rad], speed, acceleration; MOVE: coefficients over time [s]; PUSH: force of the
-        # sample at its begin and of one that is ahead, at its end, x and y [N]
+        # START: angle [rad], speed, acceleration; MOVE: coefficients over time [s]; PUSH: force x and y [N]
         ("motion", "f8", (6,)),
     ]
 )
@@ -52,7 +48,7 @@ def add_step(steps, n, code, begin_ns, end_ns, detail):
     """Write step n with zero motion; returns n + 1."""
     step = steps[n]
     step.code, step.begin_ns, step.end_ns, step.detail = code, begin_ns, end_ns, detail
-    step.turns, step.bridged_ns, step.until_next_ns, step.torque = 0, 0, 0, 0.0
+    step.turns, step.bridged_ns, step.torque = 0, 0, 0.0
     for i in range(6):
         step.motion[i] = 0.0
     return n + 1

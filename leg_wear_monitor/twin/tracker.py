@@ -3,7 +3,14 @@
 import math
 from collections.abc import Iterator
 
-from leg_wear_monitor.compiled.kernel import Record, Records, entry, kernel, new_records, record_of
+from leg_wear_monitor.compiled.kernel import (
+    Record,
+    compile_for,
+    entry,
+    kernel,
+    new_records,
+    record_of,
+)
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.crank_motion import (
     FIRST_LOAD_N,
@@ -36,9 +43,14 @@ from leg_wear_monitor.twin.steps import (
     room_for_steps,
 )
 from leg_wear_monitor.twin.tracker_state import (
+    ACQUIRE_NS,
     ARRIVALS,
+    BACKWARD_JUMP_NS,
+    BRIDGE_LIMIT_NS,
+    MARK_GAP_NS,
     QUEUE,
     QUEUED,
+    REORDER_WINDOW_NS,
     TRACKER_STATE,
     TrackerState,
     tracker_model,
@@ -106,7 +118,7 @@ DROP_IT, KEEP_IT, AFTER_JUMP = range(3)
 
 
 @kernel
-def arrive(model, state, sample):
+def arrive(state, sample):
     """Decision on a sample, by its stamp and the previous ones.
 
     A stamp far from the others is accepted only after a second one follows it: one wrong clock reading must
@@ -115,9 +127,9 @@ def arrive(model, state, sample):
     clock, count, candidate = state.clock, state.counts, state.candidate
     stamp, kind = sample.stamp_ns, sample.kind
     ahead = stamp - clock.newest_ns
-    if clock.newest_ns != 0 and (ahead > model.bridge_limit_ns or ahead < -model.backward_jump_ns):
+    if clock.newest_ns != 0 and (ahead > BRIDGE_LIMIT_NS or ahead < -BACKWARD_JUMP_NS):
         after = stamp - candidate.stamp_ns
-        if candidate.stamp_ns != 0 and -model.reorder_window_ns <= after <= model.bridge_limit_ns:
+        if candidate.stamp_ns != 0 and -REORDER_WINDOW_NS <= after <= BRIDGE_LIMIT_NS:
             if after == 0 and kind == candidate.kind:
                 count.duplicates += 1
                 return DROP_IT
@@ -141,7 +153,7 @@ def arrive(model, state, sample):
 
 
 @kernel
-def horizon_of(model, clock):
+def horizon_of(clock):
     """Stamp [ns] up to which the order of samples is final, one window behind the youngest.
 
     Kinds wait for each other up to the longest bridged gap: samples of a topic that is late, or that arrive
@@ -150,9 +162,9 @@ def horizon_of(model, clock):
     newest = clock.newest_ns
     horizon = newest
     for kind in range(clock.newest_of_ns.shape[0]):
-        if newest - clock.newest_of_ns[kind] <= model.bridge_limit_ns:
+        if newest - clock.newest_of_ns[kind] <= BRIDGE_LIMIT_NS:
             horizon = min(horizon, clock.newest_of_ns[kind])
-    return horizon - model.reorder_window_ns
+    return horizon - REORDER_WINDOW_NS
 
 
 @kernel
@@ -219,7 +231,7 @@ def _filter(model, state, sample, row):
     h, step = 1.0e-9 * (sample.stamp_ns - clock.filter_ns), 1.0e-9 * gap
     trusted = clock.velocity_credit >= _ENOUGH_CREDIT
     used, verdict = update(
-        model, h, step, sample.crank_angle_rad, sample.crank_velocity_radps, trusted, state.estimate, row
+        h, step, sample.crank_angle_rad, sample.crank_velocity_radps, trusted, state.estimate, row
     )
     clock.filter_ns = sample.stamp_ns
     if not used:
@@ -233,7 +245,7 @@ def _filter(model, state, sample, row):
         clock.velocity_credit = min(clock.velocity_credit + 1, _ENOUGH_CREDIT)
     longest = _GAP_PERIODS * clock.period_ns
     clock.period_ns = min(gap, clock.period_ns * 21 // 20 + 1) if clock.period_ns > 0 else gap
-    if gap > max(model.mark_gap_ns, longest) and longest > 0:
+    if gap > max(MARK_GAP_NS, longest) and longest > 0:
         row.bridged = 1
         count.gaps_bridged += 1
     return True
@@ -246,9 +258,9 @@ def _follow(model, state, sample, steps, n):
     n = _make_room(state, steps, n)
     since = stamp - clock.last_crank_ns
     reason = -1
-    if clock.last_crank_ns != 0 and since > model.bridge_limit_ns:
+    if clock.last_crank_ns != 0 and since > BRIDGE_LIMIT_NS:
         reason = LOST_IN_GAP
-    elif kind == CRANK and clock.refused >= _AT_LEAST_REFUSED and since > model.acquire_ns:
+    elif kind == CRANK and clock.refused >= _AT_LEAST_REFUSED and since > ACQUIRE_NS:
         reason = LOST_BY_OUTLIERS
     if reason >= 0:
         n = lose(state, stamp, reason, steps, n)
@@ -341,14 +353,14 @@ def track(models, states, arrivals, queue, samples, steps):
             continue
         if not abs(sample.crank_velocity_radps) <= LARGEST_RATE:
             sample.crank_velocity_radps = math.nan
-        decision = arrive(model, state, sample)
+        decision = arrive(state, sample)
         while decision != DROP_IT:
             horizon = clock.newest_ns  # before a new time base, release all waiting samples
             if decision == KEEP_IT:
                 if not insert(state, sample):
                     count.duplicates += 1
                     break
-                horizon = horizon_of(model, clock)
+                horizon = horizon_of(clock)
             n = _release(model, state, horizon, steps, n)
             if decision == KEEP_IT:
                 break
@@ -359,10 +371,6 @@ def track(models, states, arrivals, queue, samples, steps):
 
 _CHUNK = 256  # samples per call of the kernel
 _STEPS_A_SAMPLE = 7  # largest number of steps per sample
-
-
-TrackerSnapshot = tuple[Records, Records, Records]
-"""State of a tracker, and its two queues with the waiting samples only."""
 
 
 class CrankTracker:
@@ -407,6 +415,12 @@ class CrankTracker:
             n = track(self._model, self.records, self._arrivals, self._queue, own, self.steps)
             yield self.steps, int(n)
 
+    def compile(self) -> None:
+        """Compile the tracking of samples, or load it."""
+        compile_for(
+            track, self._model, self.records, self._arrivals, self._queue, self._block[:0], self.steps
+        )
+
     @property
     def due_stamp_ns(self) -> int:
         """Stamp that the samples of all kinds must reach for the next spline node; 0 while none is followed.
@@ -416,18 +430,5 @@ class CrankTracker:
         (model,), clock = self._model, self.state.clock
         if not clock.followed:
             return 0
-        waits = model["node_interval_ns"] + model["lag_ns"] + model["reorder_window_ns"]
+        waits = model["node_interval_ns"] + model["lag_ns"] + REORDER_WINDOW_NS
         return int(clock.last_node_ns + waits)
-
-    def snapshot(self) -> TrackerSnapshot:
-        """A copy of the whole state."""
-        clock = self.state.clock
-        waiting, queue = self._arrivals[: clock.waiting], self._queue[clock.head : clock.tail]
-        return self.records.copy(), waiting.copy(), queue.copy()
-
-    def restore(self, snapshot: TrackerSnapshot) -> None:
-        """Restore a snapshot of a tracker of the same settings."""
-        self.records[:], waiting, queue = snapshot
-        clock = self.state.clock
-        self._arrivals[: clock.waiting] = waiting
-        self._queue[clock.head : clock.tail] = queue

@@ -6,7 +6,14 @@ import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record, Records, new_records, record_of
 from leg_wear_monitor.twin import KINDS
-from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, TrackerSettings
+from leg_wear_monitor.twin.sample import (
+    BANDWIDTH_HZ,
+    BRIDGE_LIMIT_S,
+    FAULTS,
+    GAIT_SAMPLE,
+    REORDER_WINDOW_S,
+    TrackerSettings,
+)
 from leg_wear_monitor.twin.steps import SPLINE_NODE
 
 # State of the crank tracker: settings, counts, clocks, filter, queues.
@@ -14,26 +21,31 @@ from leg_wear_monitor.twin.steps import SPLINE_NODE
 
 ARRIVALS, QUEUE = 2048, 4096  # capacities for samples that wait for their order, and for the leg
 
-_RUN_UPS = 0.8  # run-up from rest, in 1 / bandwidth
+
+def _nanoseconds(time_s: float) -> int:
+    return round(1.0e9 * time_s)
+
+
+# Constants of the tracker. Noise refers to 200 Hz; only the ratio of both noises and, for the gate, the first
+# one have an effect.
+ANGLE_NOISE, VELOCITY_NOISE = (sigma**2 * (1.0 / 200.0) for sigma in (1.0e-3, 0.05))  # rad^2 s, rad^2/s
+VELOCITY_GATE = 0.5  # rad/s, as `GATE_RAD` of the angle
+MARK_GAP_NS = 50_000_000  # shortest gap that is counted
+BACKWARD_JUMP_NS = 1_000_000_000  # a larger backward jump of stamps begins a new time base
+ACQUIRE_NS = 100_000_000  # time for which samples must agree before the leg is set in motion
+STOP_HOLD_NS = 300_000_000  # time of slow motion before the crank is at rest
+SETTLE_NS = 500_000_000  # time of a speed within tolerance, or beyond, before the state changes
+REORDER_WINDOW_NS, BRIDGE_LIMIT_NS = _nanoseconds(REORDER_WINDOW_S), _nanoseconds(BRIDGE_LIMIT_S)
+RUN_UP_NS = _nanoseconds(0.8 / BANDWIDTH_HZ)  # time for a smooth start from rest
+LONGEST_SPREAD = 1.0 / (2.0 * np.pi * BANDWIDTH_HZ)  # s: longest time that a sample's noise is spread over
+JERK = ANGLE_NOISE * (2.0 * np.pi * BANDWIDTH_HZ) ** 6  # rad^2/s^5: power density of the jerk
+# a crank is slow below this speed [rad/s], or below this fraction of the commanded speed
+_STOP_SPEED, _STOP_FRACTION = 0.1, 0.2
 
 TRACKER_MODEL = np.dtype(
     [
-        ("reorder_window_ns", "i8"),  # largest delay of a sample behind younger ones
         ("lag_ns", "i8"),  # time of samples after a spline node
-        ("bridge_limit_ns", "i8"),  # longest gap that is bridged
-        ("mark_gap_ns", "i8"),  # shortest gap that is counted
-        ("backward_jump_ns", "i8"),  # largest backward jump of stamps in one time base
-        ("acquire_ns", "i8"),  # time of samples before the first spline node
-        ("stop_hold_ns", "i8"),  # time of slow motion before the crank is at rest
-        ("settle_ns", "i8"),  # time of a speed within tolerance, or beyond, before the state changes
         ("node_interval_ns", "i8"),  # least time between spline nodes
-        ("run_up_ns", "i8"),  # time for a smooth start from rest
-        ("jerk", "f8"),  # power density of the jerk [rad^2/s^5]
-        ("angle_noise", "f8"),  # [rad^2 s]
-        ("velocity_noise", "f8"),  # [rad^2/s]
-        ("longest_spread", "f8"),  # longest time that a sample's noise is spread over [s]
-        ("gate", "f8"),  # gate of the angle's innovation [rad]
-        ("velocity_gate", "f8"),  # gate of the velocity's innovation [rad/s]
         ("stop_speed", "f8"),  # least speed of a moving crank [rad/s]
         ("slowest", "f8"),  # least speed of a gait in step [rad/s]
         ("fastest", "f8"),  # largest speed of a gait in step [rad/s]
@@ -160,32 +172,15 @@ class TrackerState(NamedTuple):
     queue: Records
 
 
-_TIMES = ("reorder_window", "bridge_limit", "mark_gap", "backward_jump", "acquire", "stop_hold", "settle")
-
-
-def _nanoseconds(time_s: float) -> int:
-    return round(1.0e9 * time_s)
-
-
 def tracker_model(settings: TrackerSettings) -> Records:
-    """The settings as a record; noise refers to 200 Hz, so the bandwidth is the same at any rate."""
-    s, w, reference = settings, 2.0 * np.pi * settings.bandwidth_hz, 1.0 / 200.0
+    """The settings as a record."""
     models, speed = new_records(1, TRACKER_MODEL), abs(settings.commanded_speed_radps)
     model = record_of(models)
-    for name in _TIMES:
-        models[f"{name}_ns"] = _nanoseconds(getattr(s, f"{name}_s"))
-    model.lag_ns = _nanoseconds(s.lag)
-    model.node_interval_ns = _nanoseconds(s.node_interval)
-    model.run_up_ns = _nanoseconds(_RUN_UPS / s.bandwidth_hz)
-    model.angle_noise = s.encoder_noise_rad**2 * reference
-    model.jerk = model.angle_noise * w**6
-    model.velocity_noise = s.velocity_noise_radps**2 * reference
-    model.longest_spread = 1.0 / w
-    model.gate = s.gate_rad
-    model.velocity_gate = s.velocity_gate_radps
-    model.stop_speed = s.stop_speed
-    model.slowest = speed * (1.0 - s.speed_tolerance)
-    model.fastest = speed * (1.0 + s.speed_tolerance)
-    model.commanded_speed = s.commanded_speed_radps
-    model.largest_speed = s.largest_speed
+    model.lag_ns = _nanoseconds(settings.lag_s)
+    model.node_interval_ns = _nanoseconds(settings.knot_interval_s)
+    model.stop_speed = min(_STOP_SPEED, _STOP_FRACTION * speed)
+    model.slowest = speed * (1.0 - settings.speed_tolerance)
+    model.fastest = speed * (1.0 + settings.speed_tolerance)
+    model.commanded_speed = settings.commanded_speed_radps
+    model.largest_speed = settings.largest_speed
     return models

@@ -174,7 +174,7 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
     [
         ("measured", lambda t: t < 7.0, "the mean load of earlier gait cycles acts"),
         ("measured", lambda t: t < 0.0, "no load acts: the modelled wear on the ground is too small"),
-        ("measured", lambda t: abs(t % 1.0 - 0.4) < 0.3, "the samples themselves act"),
+        ("measured", lambda t: abs(t % 1.0 - 0.4) < 0.3, "the mean load of the last gait cycles acts"),
         ("none", lambda t: t < 7.0, "the load by the drive torque acts"),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 START_NS = 1_700_000_000_123_456_789
@@ -30,15 +30,7 @@ def gait() -> Callable[..., Samples]:
     return _gait
 
 
-@pytest.fixture(scope="session")
-def _made(leg: Mechanism) -> tuple[DigitalTwin, TwinSnapshot]:
-    twin = DigitalTwin(leg)
-    return twin, twin.snapshot()
-
-
 @pytest.fixture
-def twin(_made: tuple[DigitalTwin, TwinSnapshot]) -> DigitalTwin:
-    """A twin of the default leg as new; one for all tests, since its tables take a second."""
-    one, new = _made
-    one.restore(new)
-    return one
+def twin(leg: Mechanism) -> DigitalTwin:
+    """A twin of the default leg as new."""
+    return DigitalTwin(leg)

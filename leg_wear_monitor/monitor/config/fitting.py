@@ -110,7 +110,6 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.T
         load_source=config.foot_load.source,
         load_frame=config.foot_load.frame,
         load_model=config.load.model,
-        load_shape=sample.GROUND if config.load.model == sample.GROUND else sample.STANCE,
     )
 
 

@@ -1,10 +1,8 @@
-"""A measured force at the foot acts at its time: the twin carries and wears as the leg that bears it."""
+"""The mean of a measured force at the foot acts: the twin carries and wears as the leg that bears it."""
 
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import leg_wear_monitor as lw
 from leg_wear_monitor import Mechanism
@@ -15,7 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, with_toe_force
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.twin import LOAD
-from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples, TwinSettings, gait_samples
 
 PEAK_N, BEGIN = 300.0, 0.5
@@ -28,19 +26,10 @@ def stance(leg: Mechanism) -> Floats:
     return PEAK_N * nominal_stance(build_linkage(leg)).force(points=POINTS)
 
 
-@pytest.fixture(scope="module")
-def made(leg: Mechanism) -> tuple[DigitalTwin, TwinSnapshot]:
-    """A twin that takes the measured load, and its state as new."""
-    one = DigitalTwin(leg, MEASURED)
-    return one, one.snapshot()
-
-
 @pytest.fixture
-def twin(made: tuple[DigitalTwin, TwinSnapshot]) -> DigitalTwin:
-    """That twin as new."""
-    one, new = made
-    one.restore(new)
-    return one
+def twin(leg: Mechanism) -> DigitalTwin:
+    """A twin that takes the measured load."""
+    return DigitalTwin(leg, MEASURED)
 
 
 def pushed(crank: Samples, stance: Floats, rate_hz: float, noise_n: float = 0.0) -> Samples:
@@ -67,18 +56,17 @@ def test_rows_with_a_force_are_those_of_the_loaded_leg(leg, stance):
         )
 
 
-@pytest.mark.parametrize("rate_hz, error", [(50, 1.6e-3), (200, 3.0e-4), (1000, 3.0e-4)])
-def test_the_force_is_that_of_its_time(twin, gait, stance, rate_hz, error):
-    """Held until the next sample, it would be late by half a period, 10 ms at 50 Hz, and 4 N off on average.
-
-    Mean error over the peak; the mean itself lacks what is below a twentieth of the peak.
-    """
-    twin.update(pushed(gait(5.0), stance, rate_hz))
-    wrong = twin._follower._load.rows.force - stance
+@pytest.mark.parametrize("rate_hz, error", [(50, 4.0e-3), (200, 2.0e-3), (1000, 2.0e-3)])
+def test_the_mean_force_acts_from_the_second_gait_cycle_on(twin, gait, stance, rate_hz, error):
+    """Mean error over the peak; the mean itself lacks what is below a twentieth of the peak."""
+    cycles = twin.update(pushed(gait(5.0), stance, rate_hz)).cycles
+    wrong = twin._load.acting_n - stance
     assert np.abs(wrong).mean() < error * PEAK_N
     assert np.abs(wrong.mean(axis=0)).max() < 0.003 * stance[:, 1].mean()
     slope = np.gradient(stance[:, 1], 1.0 / POINTS)
     assert abs(wrong[:, 1] @ slope / (slope @ slope)) < 1.0e-4  # s late
+    peaks = [cycle.load_peak_n for cycle in cycles]  # 2.2 % low at 50 Hz, where samples are 7 degrees apart
+    assert peaks == pytest.approx([0.0] + [PEAK_N] * (len(peaks) - 1), rel=0.03)
 
 
 # Largest deviation of the mean forces, 5.3 sigma and the mean; mean and sigma of Archard's integral of 12
@@ -121,9 +109,9 @@ def test_a_row_that_no_sample_reaches_keeps_the_force_of_the_cycle_before(twin, 
     since_s = 1.0e-9 * (walk["stamp_ns"] - walk["stamp_ns"][0])
     lost = (walk["kind"] == LOAD) & (since_s > 2.5) & (since_s < 2.8)
     cycles = twin.update(walk[~lost]).cycles
-    assert np.abs(twin._follower._load.rows.force - stance).mean() < 5.0e-4 * PEAK_N
+    assert np.abs(twin._load.acting_n - stance).mean() < 2.0e-3 * PEAK_N
     assert [cycle.load.gap_s for cycle in cycles] == pytest.approx([0.0, 0.305], abs=0.006)
-    assert cycles[-1].load_peak_n == pytest.approx(PEAK_N, rel=0.01)
+    assert cycles[-1].load_peak_n == pytest.approx(PEAK_N, rel=0.03)
 
 
 def test_a_force_along_the_axes_of_the_foot_is_turned(leg, gait, stance):
@@ -137,26 +125,16 @@ def test_a_force_along_the_axes_of_the_foot_is_turned(leg, gait, stance):
     assert np.ptp(angle) > 0.3
     twin = DigitalTwin(leg, attrs.evolve(MEASURED, load_frame="foot"))
     cycle = twin.update(pushed(gait(3.0), of_foot, 200.0)).cycles[-1]
-    assert np.abs(twin._follower._load.rows.force - stance).mean() < 1.0e-3 * PEAK_N
+    assert np.abs(twin._load.acting_n - stance).mean() < 2.0e-3 * PEAK_N
     assert cycle.load.largest_n == pytest.approx(PEAK_N, rel=0.01)
 
 
-@settings(max_examples=4)
-@given(cuts=st.lists(st.integers(1, 1100), min_size=1, max_size=30, unique=True))
-def test_blocks_and_snapshots_change_nothing(made, gait, stance, cuts):
-    loaded, fresh = made
-    walk = pushed(gait(2.7), stance, 250.0)
-    seen = []
-    for split in ([], sorted(cuts)):
-        loaded.restore(fresh)
-        cycles = []
-        for block in np.split(walk, split):
-            cycles += loaded.update(block).cycles
-            if split:
-                now = loaded.snapshot()
-                loaded.update(walk[:300])  # astray
-                loaded.restore(now)
-        seen.append((cycles, loaded.depth, loaded._follower._load.rows.force.copy()))
+def test_blocks_change_nothing(leg, gait, stance):
+    walk, seen = pushed(gait(2.7), stance, 250.0), []
+    for split in ([], range(1, len(walk), 37)):
+        twin = DigitalTwin(leg, MEASURED)
+        cycles = [one for block in np.split(walk, split) for one in twin.update(block).cycles]
+        seen.append((cycles, twin.depth, twin._load.acting_n))
     for one, other in zip(seen[0][0], seen[1][0], strict=True):
         np.testing.assert_array_equal(one.archard_j, other.archard_j)
         np.testing.assert_array_equal(one.load.force_n, other.load.force_n)
@@ -167,8 +145,8 @@ def test_blocks_and_snapshots_change_nothing(made, gait, stance, cuts):
 def test_other_parameters_leave_the_force_where_it_is(twin, gait, stance):
     walk = pushed(gait(3.0), stance, 200.0)
     twin.update(walk)
-    before = [table.copy() for table in twin._follower._load.tables]
+    before = [table.copy() for table in twin._load.tables]
     estimated = stance[:: POINTS // PHASES]  # the diagnosis knows the load from the torque
     twin.set_parameters(attrs.evolve(twin.parameters, friction=1.5, load=estimated))
-    for table, wanted in zip(twin._follower._load.tables, before, strict=True):
+    for table, wanted in zip(twin._load.tables, before, strict=True):
         np.testing.assert_allclose(table, wanted, rtol=1.0e-6, atol=1.0e-9)

@@ -23,7 +23,7 @@ from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 START_NS = 1_700_000_000 * 10**9
 TURN = 2.0 * math.pi

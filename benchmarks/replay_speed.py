@@ -23,7 +23,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 from leg_wear_monitor.recordings.reader import Recording
 from leg_wear_monitor.twin import TORQUE
 

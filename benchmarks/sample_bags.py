@@ -14,7 +14,7 @@ import attrs
 from mcap.reader import make_reader
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 ROOT = Path(__file__).parents[1]
 DOMAIN = "77"

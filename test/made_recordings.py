@@ -168,7 +168,7 @@ def expected():
 
 def losses(recording):
     """What is said of lost parts of a recording."""
-    return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
+    return [finding.text for finding in recording.findings if finding.weight is Severity.LOSS]
 
 
 @pytest.fixture(scope="session")

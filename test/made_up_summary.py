@@ -12,12 +12,10 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Le
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.recordings.findings import Severity
-from leg_wear_monitor.recordings.history import CYCLE_COLUMNS, SUMMARY_COLUMNS
+from leg_wear_monitor.recordings.findings import Finding, Severity
 from leg_wear_monitor.recordings.result import (
     EncoderEvidence,
     LegJoint,
-    ReplayFinding,
     ReplayGait,
     ReplayHistory,
     ReplayJoint,
@@ -28,6 +26,7 @@ from leg_wear_monitor.recordings.result import (
     ReplaySummary,
     WornDepth,
 )
+from leg_wear_monitor.recordings.summary import CYCLE_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.state import (
     AlarmChange,
     Drive,
@@ -112,7 +111,7 @@ def made_up_summary() -> ReplaySummary:
         **attrs.asdict(made_up_state(), recurse=False),
         recording=ReplayRecording(
             files=("a.mcap",), topics={"joint_states": "/joint_states"}, time="header", is_partial=True,
-            findings=(ReplayFinding(file="a.mcap", text="ends at byte 7", weight=Severity.LOSS),),
+            findings=(Finding(file="a.mcap", text="ends at byte 7", weight=Severity.LOSS),),
             crank_samples=5, torque_samples=6, begin_ns=int(stamps[0]), end_ns=int(stamps[1]),
             duration_s=2e-9,
         ),

@@ -8,7 +8,7 @@ import numpy as np
 from mcap.reader import make_reader
 
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 from leg_wear_monitor.recordings.streams import JOINT_STATE, WRENCH_STAMPED
 
 Message = tuple[int, int, bytes]

@@ -24,8 +24,8 @@ from leg_wear_monitor.dashboard.leg_page import (
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import finite_or_none, number_of, or_nan, received_json
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.recordings.history import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.recordings.result import ReplayHistory, ReplayStatus, ReplaySummary
+from leg_wear_monitor.recordings.summary import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
 
 # Messages as other processes sent them; nothing in them is trusted.

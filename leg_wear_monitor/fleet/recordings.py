@@ -119,7 +119,7 @@ def add_line(directory: Path, one: ReadRecording) -> None:
 def state_of(path: Path) -> tuple[int, int]:
     """Bytes of a recording's files, and the time of their last change [ns]; zeros if there are none."""
     try:
-        states = [file.path.stat() for file in find_files([path])[0]]
+        states = [file.path.stat() for file in find_files([path])]
     except (RecordingError, OSError):
         return 0, 0
     return sum(each.st_size for each in states), max(each.st_mtime_ns for each in states)

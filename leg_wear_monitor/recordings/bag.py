@@ -10,8 +10,6 @@ from typing import Any, Protocol, TypeAlias, cast
 
 import attrs
 from numpy.typing import ArrayLike
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -34,8 +32,6 @@ from leg_wear_monitor.twin import TORQUE
 # Resolve the user's paths to an ordered list of recordings: bags (plain, split, compressed) and tables.
 
 
-METADATA = "metadata.yaml"
-_LARGEST = 2**20  # bytes of metadata; a bag of 200 topics and 1000 files has some 250 kB
 MCAP, IN_MEMORY = ".mcap", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
 _NAME = re.compile(r".*(\.mcap|\.db3)", re.DOTALL)
@@ -99,8 +95,8 @@ def listed_recordings(given: Recordable | Iterable[Recordable]) -> list[Recordab
     return list(given)
 
 
-def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding]]:
-    """Find the recording files of paths, and report findings about their directories.
+def find_files(paths: Iterable[Recordable]) -> list[BagFile]:
+    """Find the recording files of paths.
 
     Parameters
     ----------
@@ -113,21 +109,19 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
         If a path does not exist, or its name is not the name of a recording.
     """
     files: list[BagFile] = []
-    findings: list[Finding] = []
     for number, given in enumerate(paths):
         if not isinstance(given, str | os.PathLike):
-            name = Path(f"table {number + 1}")
-            files.append(BagFile(name, IN_MEMORY, recording=number, table=given))
+            files.append(BagFile(Path(f"table {number + 1}"), IN_MEMORY, number, given))
             continue
         path = Path(given)
         with system_asked(path, "cannot be read", error_of=RecordingError):
             if not path.exists():
                 raise RecordingError(str(path), "", f"does not exist. Expected {_EXPECTED}")
-            found = _directory(path, findings) if path.is_dir() else [_file(path)]
-        files += [attrs.evolve(file, recording=number) for file in found]
+            found = _directory(path) if path.is_dir() else [path]
+            files += [BagFile(each, _storage(each), number) for each in found]
     if not files:
-        raise RecordingError("", "", f"no recording given. Expected {_EXPECTED}")
-    return files, findings
+        raise RecordingError("", "", f"no recording given, expected {_EXPECTED}")
+    return files
 
 
 def is_recording_name(path: Path) -> bool:
@@ -142,11 +136,12 @@ def is_bag_directory(path: Path) -> bool:
     """
     names = [file.name for file in path.iterdir() if _NAME.fullmatch(file.name)]
     return bool(names) and (
-        (path / METADATA).is_file() or all(name.startswith(f"{path.name}_") for name in names)
+        (path / "metadata.yaml").is_file() or all(name.startswith(f"{path.name}_") for name in names)
     )
 
 
-def _file(path: Path) -> BagFile:
+def _storage(path: Path) -> str:
+    """Kind of a file by its name, the lower-case end of it."""
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
         remedy = _REMEDIES.get(path.suffix.lower())
@@ -154,40 +149,16 @@ def _file(path: Path) -> BagFile:
         raise RecordingError(str(path), "", text)
     if not path.is_file():
         raise RecordingError(str(path), "", f"not a file. Expected {_EXPECTED}")
-    return BagFile(path, match[1].lower())
+    return match[1].lower()
 
 
-def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
-    """Files of a bag directory, ordered by its metadata; without metadata, ordered by file number."""
+def _directory(path: Path) -> list[Path]:
+    """Files of a bag directory, by their numbers; one that is compressed as a whole is refused later."""
     files = [file for file in path.iterdir() if _NAME.fullmatch(file.name) and file.is_file()]
-    named = _named(path / METADATA, findings)
-    for name in named:
-        if not (path / name).is_file():
-            findings.append(Finding(path / METADATA, f"names {name}, which does not exist: it is lost"))
-    for file in files:
-        if named and file.name not in named:
-            findings.append(Finding(file, f"is not named by {METADATA}: it is not read"))
-    chosen = [path / name for name in named if (path / name) in files] or sorted(files, key=_by_number)
-    if not chosen:
-        for packed in path.glob("*.zstd"):
-            return [_file(packed)]  # it is refused with the remedy
+    files = files or list(path.glob("*.zstd"))
+    if not files:
         raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
-    return [_file(file) for file in chosen]
-
-
-def _named(path: Path, findings: list[Finding]) -> list[str]:
-    """Names of files in a bag's metadata; empty without readable metadata."""
-    if not path.exists():
-        return []
-    try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST).decode()
-        names = YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"]["relative_file_paths"]
-        return list(dict.fromkeys(Path(name).name.removesuffix(".zstd") for name in names))
-    except (OSError, YAMLError, LookupError, TypeError, ValueError):
-        text = "cannot be read: the directory's files are taken instead"
-        findings.append(Finding(path, text, Severity.NOTE))
-        return []
+    return sorted(files, key=_by_number)
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:

@@ -60,29 +60,35 @@ class Severity(Enum):
     """Something that was recorded is not in the result, or may be wrong in it."""
 
 
+def _shown(path: Path | str) -> str:
+    return printable(str(path))
+
+
 @attrs.frozen
 class Finding:
     """One fault or remark about one file.
 
     Attributes
     ----------
-    file : pathlib.Path
+    file : str
+        File with the issue.
     text : str
-        One printable line: the problem, and its byte position.
-    severity : Severity
+        Description of the issue, on one line.
+    weight : Severity
+        Effect on the result: ``loss`` if data are lost or may be wrong.
     """
 
-    file: Path
+    file: str = attrs.field(converter=_shown)
     text: str = attrs.field(converter=printable)
-    severity: Severity = Severity.LOSS
+    weight: Severity = Severity.LOSS
 
     def __str__(self) -> str:
-        return f"{printable(str(self.file))}: {self.text}"
+        return f"{self.file}: {self.text}"
 
     @property
     def line(self) -> str:
         """Line for the command line: a warning, or a note where no action is needed."""
-        return f"{'note' if self.severity is Severity.NOTE else 'warning'}: {self}"
+        return f"{'note' if self.weight is Severity.NOTE else 'warning'}: {self}"
 
 
 class DamageError(Exception):

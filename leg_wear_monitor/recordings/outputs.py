@@ -28,8 +28,7 @@ from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.verdict import with_unit
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS
-from leg_wear_monitor.recordings.qos import LATCHED, SENSOR_DATA
-from leg_wear_monitor.recordings.streams import Outgoing, Output, single
+from leg_wear_monitor.recordings.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 

@@ -14,7 +14,8 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import bag
 from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
 from leg_wear_monitor.recordings.findings import Finding, Piece, RecordingError, Severity, listed, reading
-from leg_wear_monitor.recordings.names import (
+from leg_wear_monitor.recordings.message_checks import (
+    WrenchAxis,
     is_without,
     names_in,
     twice,
@@ -22,7 +23,6 @@ from leg_wear_monitor.recordings.names import (
     without_interface,
 )
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.recordings.wrench_axis import WrenchAxis
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
@@ -283,7 +283,6 @@ class Clocks:
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
 _COMPARED = 100  # wrenches per file to compare the axes
-_MOST_WAITING = 640_000  # samples of overlapping chunks that are held, at 800 bytes with copies
 
 
 class Recording:
@@ -329,7 +328,7 @@ class Recording:
         self.time = time
         self._clocks = Clocks()
         self._decoder = Decoder(config)
-        bag_files, self._findings = bag.find_files(paths)
+        bag_files, self._findings = bag.find_files(paths), list[Finding]()
         self._axis = WrenchAxis(config.drive_torque.axis)
         self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
         with ExitStack() as stack:
@@ -366,7 +365,7 @@ class Recording:
     @property
     def is_partial(self) -> bool:
         """True if recorded data are lost or may be wrong."""
-        return any(finding.severity is Severity.LOSS for finding in self.findings)
+        return any(finding.weight is Severity.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:
         """Iterate over the samples of the whole recording; possible once only.
@@ -395,10 +394,6 @@ class Recording:
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
                 waiting = waiting.part(slice(passed, None))
-            elif len(waiting.samples) > _MOST_WAITING:
-                self._too_many_wait(bag_file.path)
-                yield waiting
-                waiting = waiting.part(slice(0))
             read += piece.stored
             times = piece.messages["log_time_ns"]
             source = np.full(len(times), number, np.int64)
@@ -416,11 +411,6 @@ class Recording:
             piece = due.load()
             if piece is not None:
                 yield number, piece
-
-    def _too_many_wait(self, path: Path) -> None:
-        text = f"has chunks that overlap in time by over {_MOST_WAITING} messages: some come out of order"
-        if not any(finding.text == text for finding in self._findings):
-            self._findings.append(Finding(path, text))
 
     def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""

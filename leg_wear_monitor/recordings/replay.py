@@ -1,7 +1,7 @@
 """Replay of a recording through the monitor; the reports equal the reports of a live run."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import attrs
@@ -15,13 +15,15 @@ from leg_wear_monitor.monitor.config.parameters import NODE, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.file import copy_of
-from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S
+from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
 from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.recordings.history import History, Sink
+from leg_wear_monitor.recordings.leg_markers import LegDrawing, LegMarkers
+from leg_wear_monitor.recordings.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
 from leg_wear_monitor.recordings.reader import Block, Recording
-from leg_wear_monitor.recordings.summary import ReplayResult
+from leg_wear_monitor.recordings.streams import ForecastTimes, topic_of
+from leg_wear_monitor.recordings.summary import History, ReplayResult
 from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import Samples
 
@@ -150,7 +152,7 @@ def replay(
 def _run(
     result: ReplayResult,
     recording: Recording,
-    sink: Sink | None,
+    sink: "Sink | None",
     progress: Callable[[float], None] | None,
 ) -> None:
     """Process all blocks of a recording."""
@@ -208,7 +210,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
     return found
 
 
-def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
+def _take(result: ReplayResult, samples: Samples, sink: "Sink | None") -> None:
     """Process samples with the monitor, and store the reports."""
     reports = result.monitor.update(samples)
     for cycle in reports.cycles:
@@ -243,3 +245,76 @@ def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples
     """Split the samples of a block at the times when diagnostics are due."""
     period_ns = round(DIAGNOSTICS_PERIOD_S * 1e9)
     yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)
+
+
+# Writes reports to an MCAP file, as the messages that a live node would have published.
+
+
+_CHUNK_BYTES = 2**20
+
+
+class Sink:
+    """An MCAP file with all topics of the monitor, including those without messages.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    monitor : WearMonitor
+    node : str
+        Full name of the publishing node.
+
+    Raises
+    ------
+    RecordingError
+        If writing to the disk fails.
+    """
+
+    def __init__(self, path: Path, monitor: WearMonitor, node: str = NODE) -> None:
+        from leg_wear_monitor.recordings.mcap_file import McapWriter  # a dashboard is without this library
+
+        self._monitor = monitor
+        self._messages = Messages(monitor.config, monitor.clearance_joints, node)
+        self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)
+        self._channels = {
+            output: self._writer.channel(topic_of(output, node), output.type, output.qos)
+            for output in self._messages.outputs
+        }
+        self._start, self._has_begun = (monitor.alarms, monitor.state_report), False
+        self._forecasts = ForecastTimes()
+        self._markers = (
+            LegMarkers(monitor, LegDrawing(monitor.mechanism)) if monitor.config.publish_markers else None
+        )
+
+    def __enter__(self) -> "Sink":
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        # report the original error, not one from closing the file
+        with suppress(RecordingError) if kind else nullcontext():
+            self._writer.close()
+
+    def take(self, reports: Reports, stamp_ns: int) -> None:
+        """Write reports and the status of the monitor after them.
+
+        Parameters
+        ----------
+        reports : Reports
+        stamp_ns : int
+            Stamp of the status [ns]; 0 if no time is known yet.
+        """
+        if stamp_ns > 0 and not self._has_begun:
+            self._has_begun = True  # like the node, begin with all alarms, the verdict and the state
+            alarms, report = self._start
+            self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(alarms))
+            self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(report))
+            self._writer.write(self._channels[STATE], stamp_ns, self._messages.state(report))
+        for outgoing in self._messages.of(reports):
+            self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
+        for outgoing in self._markers.of(reports) if self._markers else ():
+            self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
+        for cycle in self._forecasts.due(reports):
+            raw = self._messages.forecast(cycle)
+            self._writer.write(self._channels[FORECAST], cycle.stamp_ns, raw)
+        if stamp_ns > 0:
+            raw = self._messages.diagnostics(stamp_ns, self._monitor.status())
+            self._writer.write(self._channels[DIAGNOSTICS], stamp_ns, raw)

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.recordings.findings import Severity
+from leg_wear_monitor.recordings.findings import Finding
 from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState, Level
 
 if TYPE_CHECKING:
@@ -191,25 +191,6 @@ class WornDepth:
 
 
 @attrs.frozen(kw_only=True)
-class ReplayFinding:
-    """A fault of the recording.
-
-    Attributes
-    ----------
-    file : str
-        File with the issue.
-    text : str
-        Description of the issue, on one line.
-    weight : Severity
-        Effect on the result: ``loss`` if data are lost or may be wrong.
-    """
-
-    file: str
-    text: str
-    weight: Severity
-
-
-@attrs.frozen(kw_only=True)
 class ReplayRecording:
     """The recording that the replay read.
 
@@ -223,7 +204,7 @@ class ReplayRecording:
         Source of the stamps: ``header``, ``log`` or ``publish``.
     is_partial : bool
         True if recorded data are lost or may be wrong.
-    findings : tuple of ReplayFinding
+    findings : tuple of Finding
         Faults of the recording.
     crank_samples : int
         Number of samples of the crank.
@@ -241,7 +222,7 @@ class ReplayRecording:
     topics: dict[str, str]
     time: str
     is_partial: bool
-    findings: tuple[ReplayFinding, ...]
+    findings: tuple[Finding, ...]
     crank_samples: int
     torque_samples: int
     begin_ns: int

@@ -20,7 +20,7 @@ from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.bag import Recordable, Source, check_channel, find_files, open_sources
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.findings import Channel, Finding, Piece, RecordingError, Severity
-from leg_wear_monitor.recordings.names import interfaces_in, names_in, twice
+from leg_wear_monitor.recordings.message_checks import interfaces_in, names_in, twice
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
@@ -134,7 +134,7 @@ def read_signals(
     RecordingError
         If nothing can be read, or there is no topic of joints.
     """
-    bag_files, findings = find_files(paths)
+    bag_files = find_files(paths)
     with ExitStack() as stack:
         sources, unreadable = open_sources(bag_files, config, stack)
         selected, skipped = _select(sources, joint_states, drive_torque)
@@ -154,7 +154,7 @@ def read_signals(
                     _add_piece(collected, selected, piece, config, recording)
                     read += piece.stored
                     progress(min(1.0, read / total))
-        findings += unreadable + skipped + [each for source in sources for each in source.file.findings]
+        findings = unreadable + skipped + [each for source in sources for each in source.file.findings]
     numbers = Counter(name.topic for name in collected if isinstance(name, JointName) or name.interface)
     crowded = (topic for topic, number in numbers.items() if number >= _MOST_JOINTS)
     only = f"only the first {_MOST_JOINTS} of its joints are read"

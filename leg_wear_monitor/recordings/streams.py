@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.reports import CycleReport, Reports
-from leg_wear_monitor.recordings.qos import RELIABLE, Qos
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 
 if TYPE_CHECKING:
@@ -83,6 +82,39 @@ def streams_read(sources: Mapping[int, str]) -> tuple[Stream, ...]:
 def streams_of(config: "MonitorConfig") -> tuple[Stream, ...]:
     """Streams that are read with the parameters of a monitor."""
     return streams_read({TORQUE: config.drive_torque.source, LOAD: config.foot_load.source})
+
+
+# Quality of service of topics, in the format of rosbag2 (metadata version 9).
+
+
+_PROFILE = """- history: keep_last
+  depth: {depth}
+  reliability: {reliability}
+  durability: {durability}
+  deadline: {forever}
+  lifespan: {forever}
+  liveliness: automatic
+  liveliness_lease_duration: {forever}
+  avoid_ros_namespace_conventions: false"""
+_FOREVER = "{sec: 9223372036, nsec: 854775807}"
+
+
+@attrs.frozen
+class Qos:
+    """Quality of service offered by a publisher."""
+
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    depth: int = 10
+
+    def text(self) -> str:
+        """YAML text for a channel's metadata."""
+        return _PROFILE.format(forever=_FOREVER, **attrs.asdict(self))
+
+
+RELIABLE = Qos()
+SENSOR_DATA = Qos(reliability="best_effort", depth=200)
+LATCHED = Qos(durability="transient_local", depth=1)
 
 
 # An output topic of the monitor, and messages for it.

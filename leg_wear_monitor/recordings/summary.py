@@ -3,6 +3,7 @@
 A forecast that the verdict rejects has no remaining life.
 """
 
+from array import array
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,24 +12,22 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.files import with_same_fields
+from leg_wear_monitor.files import or_nan, with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, has_changed
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.judgement import leg_alarm
-from leg_wear_monitor.monitor.reports import JointReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recordings.findings import Finding
-from leg_wear_monitor.recordings.history import CYCLE_COLUMNS, SUMMARY_COLUMNS, History
 from leg_wear_monitor.recordings.result import (
     EncoderEvidence,
     LegJoint,
     Place,
-    ReplayFinding,
     ReplayGait,
     ReplayHistory,
     ReplayJoint,
@@ -39,10 +38,109 @@ from leg_wear_monitor.recordings.result import (
     ReplaySummary,
     WornDepth,
 )
-from leg_wear_monitor.state import AlarmChange, Figure, Verdict
+from leg_wear_monitor.state import AlarmChange, Figure, Level, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, has_value_of
 from leg_wear_monitor.wear import BUSHING, JOURNAL
+
+# Replay results per gait cycle, stored as compact columns so that days of walking fit into memory.
+
+
+JOINT_COLUMNS = (
+    "clearance_m",
+    "clearance_max_m",
+    "growth_m_per_cycle",
+    "peak_force_n",
+    "p99_force_n",
+    "mean_force_n",
+    "impacts",
+)
+SEEN_COLUMNS = ("estimated_m", "estimated_sigma_m")
+"""More certain of the two estimates of a joint's clearance: from encoders or from the drive torque."""
+
+_OF_A_JOINT = (*JOINT_COLUMNS, *SEEN_COLUMNS)
+
+SUMMARY_COLUMNS = {name: name.replace("clearance_", "modelled_") for name in _OF_A_JOINT}
+"""Names of the columns of a joint in a summary, whose one clearance of a joint is the believed one."""
+
+CYCLE_COLUMNS = (
+    "cycle",
+    "cadence_rpm",
+    "moving_s",
+    "bridged_s",
+    "measured_torque_rms_nm",
+    "predicted_torque_rms_nm",
+    "torque_mismatch",
+    "load_n",
+    "friction_nm",
+)
+_MOST_CHANGES = 10_000
+
+
+class History:
+    """Gait cycles and alarm changes, in order of arrival.
+
+    Parameters
+    ----------
+    clearance_joints : tuple of str
+        The clearance joints, in the order of the reports.
+
+    Attributes
+    ----------
+    changes : list of tuples
+        Stamp [ns] and state of the alarm after the change; the first ten thousand changes.
+    worst : dict
+        Highest level of each alarm kind.
+    last : CycleReport or None
+        The last gait cycle.
+    """
+
+    def __init__(self, clearance_joints: tuple[str, ...]) -> None:
+        self.clearance_joints = clearance_joints
+        self.changes: list[tuple[int, Alarm]] = []
+        self.worst: dict[str, Level] = {}
+        self.last: CycleReport | None = None
+        self._stamps = array("q")
+        self._cycles = array("d")
+        self._joints = array("d")
+        self._before: dict[str, Alarm] = {}
+
+    def __len__(self) -> int:
+        return len(self._stamps)
+
+    def add_cycle(self, report: CycleReport) -> None:
+        """Add a gait cycle."""
+        self.last = report
+        self._stamps.append(report.stamp_ns)
+        self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
+        for joint in report.joints:
+            self._joints.extend(or_nan(getattr(joint, name)) for name in _OF_A_JOINT)
+
+    def add_alarms(self, alarms: AlarmList) -> None:
+        """Add the alarms of a list that have changed."""
+        for alarm in alarms.alarms:
+            before = self._before.get(alarm.name, Alarm(kind=alarm.kind, subject=alarm.subject))
+            if has_changed(before, alarm):
+                self._before[alarm.name] = alarm
+                self.worst[alarm.kind] = max(self.worst.get(alarm.kind, Level.OK), alarm.level)
+                if len(self.changes) < _MOST_CHANGES:
+                    self.changes.append((alarms.stamp_ns, alarm))
+
+    @property
+    def stamp_ns(self) -> Ints:
+        """End times of the gait cycles [ns], shape (cycles,)."""
+        return np.array(self._stamps, np.int64)
+
+    def column(self, name: str) -> Floats:
+        """One of `CYCLE_COLUMNS`, shape (cycles,)."""
+        table = np.array(self._cycles).reshape(len(self), len(CYCLE_COLUMNS))
+        return table[:, CYCLE_COLUMNS.index(name)]
+
+    def joint_column(self, name: str) -> Floats:
+        """One of `JOINT_COLUMNS` or `SEEN_COLUMNS`, shape (cycles, clearance joints); NaN where unknown."""
+        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(_OF_A_JOINT))
+        return table[:, :, _OF_A_JOINT.index(name)]
+
 
 # Condition of the leg at the end of a replay. A forecast that the verdict rejects has no remaining life.
 
@@ -195,10 +293,7 @@ def _recording(result: ReplayResult) -> ReplayRecording:
         result,
         files=tuple(printable(str(path)) for path in result.files),
         topics={role: printable(topic) for role, topic in result.topics.items()},
-        findings=tuple(
-            ReplayFinding(file=printable(str(one.file)), text=one.text, weight=one.severity)
-            for one in result.findings
-        ),
+        findings=tuple(result.findings),
     )
 
 

@@ -86,7 +86,7 @@ def propose(path: Path) -> Proposal | None:
     RecordingError
         If the file is not a table.
     """
-    ((file,), _) = find_files([path])
+    (file,) = find_files([path])
     with open_recording(path) as content:
         source = open_table(path, content, file.storage, Columns().crank_angle)
         names = source.head.names
@@ -200,7 +200,7 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
     RecordingError
         If the table cannot be read.
     """
-    (file,), _ = find_files([path])
+    (file,) = find_files([path])
     with open_recording(path) as content:
         table = TableFile(path, content, file.storage, config)
         stamps, counts = list[int](), 0

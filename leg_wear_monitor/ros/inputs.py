@@ -19,7 +19,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.cdr import MESSAGE, Decoder
-from leg_wear_monitor.recordings.names import is_without, names_in, twice, without_interface
+from leg_wear_monitor.recordings.message_checks import is_without, names_in, twice, without_interface
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, Stream, streams_of
 from leg_wear_monitor.twin import LOAD
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples

@@ -28,9 +28,8 @@ from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, ship
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from, is_of_node
 from leg_wear_monitor.recordings import outputs
-from leg_wear_monitor.recordings.qos import LATCHED, Qos
 from leg_wear_monitor.recordings.result import ReplayStatus
-from leg_wear_monitor.recordings.streams import Output, topic_of
+from leg_wear_monitor.recordings.streams import LATCHED, Output, Qos, topic_of
 from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
 
 # Listens to a running monitor for the dashboard: its outputs, and its parameters once.

@@ -30,8 +30,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.outputs import Messages
-from leg_wear_monitor.recordings.qos import SENSOR_DATA
-from leg_wear_monitor.recordings.streams import STREAMS, ForecastTimes
+from leg_wear_monitor.recordings.streams import SENSOR_DATA, STREAMS, ForecastTimes
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage

@@ -29,12 +29,11 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegDrawing, LegMarkers
-from leg_wear_monitor.recordings.qos import Qos
-from leg_wear_monitor.recordings.streams import Outgoing, Output
+from leg_wear_monitor.recordings.streams import Outgoing, Output, Qos
 from leg_wear_monitor.ros.running import until_down
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.recordings.mcap_writer import McapWriter
+    from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 
 # The seconds around a STOP, in a recording of their own.
@@ -227,7 +226,7 @@ class BlackBox:
 def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapWriter":
     """A writer of a file; a recording that the file contains is kept, and the log names both files."""
     try:
-        from leg_wear_monitor.recordings.mcap_writer import McapWriter
+        from leg_wear_monitor.recordings.mcap_file import McapWriter
     except ImportError as error:
         raise LegWearError(f"{parameter}: {error}; pip install 'leg_wear_monitor[bags]'") from error
     earlier = _move_aside(parameter, path)

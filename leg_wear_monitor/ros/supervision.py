@@ -18,9 +18,8 @@ from leg_wear_monitor.monitor.status import alarms_status, verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import code_of_rule, dated
-from leg_wear_monitor.recordings.names import wanted_interfaces
+from leg_wear_monitor.recordings.message_checks import WrenchAxis, wanted_interfaces
 from leg_wear_monitor.recordings.streams import INTERFACES, WRENCH_STAMPED, streams_of
-from leg_wear_monitor.recordings.wrench_axis import WrenchAxis
 from leg_wear_monitor.ros import health
 from leg_wear_monitor.ros.inputs import (
     Arrival,

@@ -15,7 +15,7 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 from leg_wear_monitor.recordings.reader import TIMES
 
 SECONDS, RATE_HZ = 4, 200

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, FLOAT64, INTERFACE, WRENCH
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 from leg_wear_monitor.recordings.reader import Recording
 
 START_NS = 1_700_000_000 * 10**9

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.findings import RecordingError
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
-from leg_wear_monitor.recordings.qos import LATCHED, SENSOR_DATA
-from leg_wear_monitor.recordings.streams import definition
+from leg_wear_monitor.recordings.mcap_file import McapWriter
+from leg_wear_monitor.recordings.streams import LATCHED, SENSOR_DATA, definition
 
 mcap_reader = pytest.importorskip("mcap.reader")
 EndOfFile = pytest.importorskip("mcap.exceptions").EndOfFile

@@ -8,7 +8,7 @@ import pytest
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
-from leg_wear_monitor.recordings.mcap_writer import McapWriter
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 START_NS, RATE_HZ = 1_700_000_000 * 10**9, 200
 

@@ -240,38 +240,6 @@ def test_an_effort_is_the_torque_where_it_is_asked_for(tmp_path, sent, write_bag
     assert np.isfinite(samples["torque_nm"]).all()
 
 
-def test_a_damaged_metadata_file_is_reported_and_done_without(tmp_path, sent, write_bag, expected, read):
-    write_bag(tmp_path / "a.mcap", sent)
-    for text in (
-        "rosbag2_bagfile_information: [",
-        "{}",
-        "\0",
-        "rosbag2_bagfile_information: {relative_file_paths: 3}",
-    ):
-        (tmp_path / "metadata.yaml").write_text(text)
-        samples, recording = read(tmp_path)
-        assert samples.tobytes() == expected(sent).tobytes()
-        assert ["metadata.yaml: cannot be read" in str(finding) for finding in recording.findings] == [True]
-
-
-def test_a_missing_part_of_a_bag_is_a_loss(tmp_path, sent, write_bag, read):
-    write_bag(tmp_path / "a_0.mcap", sent)
-    (tmp_path / "metadata.yaml").write_text(
-        "rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap, a_1.mcap]}"
-    )
-    _, recording = read(tmp_path)
-    assert losses(recording) == ["names a_1.mcap, which does not exist: it is lost"]
-
-
-def test_a_file_that_the_metadata_do_not_name_is_a_loss(tmp_path, sent, write_bag, expected, read):
-    for name in ("a_0.mcap", "a_1.mcap"):
-        write_bag(tmp_path / name, sent)
-    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap]}")
-    samples, recording = read(tmp_path)
-    assert samples.tobytes() == expected(sent).tobytes()
-    assert losses(recording) == ["is not named by metadata.yaml: it is not read"]
-
-
 def test_memory_stays_flat(tmp_path, write_bag, traffic):
     """No block holds more than a few chunks, however long the recording."""
     from leg_wear_monitor.recordings.reader import Recording

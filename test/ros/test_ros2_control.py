@@ -21,7 +21,7 @@ from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.cdr import Decoder
-from leg_wear_monitor.recordings.names import wanted_interfaces
+from leg_wear_monitor.recordings.message_checks import wanted_interfaces
 from leg_wear_monitor.recordings.streams import types
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.state import State

@@ -133,7 +133,7 @@ def _table(name: str, parameters: str | None) -> str:
     config = config_from(proposal.values) if proposal else load_config(parameters)
     lines, findings = understood(Path(name), config)
     for finding in findings:
-        if finding.severity is Severity.LOSS:
+        if finding.weight is Severity.LOSS:
             warnings.warn(str(finding), ConfigWarning, stacklevel=2)
         else:
             lines.append(f"note: {finding.text}")

@@ -83,7 +83,7 @@ def demo(out: Path) -> int:
     Then the recording goes through the same monitor again and gives the same answer.
     """
     common.need_rclpy()
-    import_module("leg_wear_monitor.recordings.mcap_writer")  # rather than in a node, once both are running
+    import_module("leg_wear_monitor.recordings.mcap_file")  # rather than in a node, once both are running
     common.check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
     _compile(out)

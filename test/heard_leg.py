@@ -69,7 +69,11 @@ def walk(leg, second=1, clearance_m=3.1e-4):
             status("verdict", HEALTHY.words, fault_code="NONE", severity=0),
             status("gait", "in step", cadence_rpm=60.0, cycles=second),
             status(
-                "torque", "measured as predicted", mismatch=0.04, measured_rms_nm=8.0, predicted_rms_nm=8.1
+                "torque",
+                ("the measured torque agrees with the prediction"),
+                mismatch=0.04,
+                measured_rms_nm=8.0,
+                predicted_rms_nm=8.1,
             ),
             status("input", "in order"),
         ],

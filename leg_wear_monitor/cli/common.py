@@ -86,7 +86,7 @@ mechanism_option: Option = option(
     default="bionic_leg",
 )
 clearances_option: Option = option(
-    "--clearances", "A,B", "The clearance joints, or none.  [default: the mechanism's own]"
+    "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: the mechanism's own]"
 )
 speed_option: Option = option(
     "--speed-rpm",
@@ -122,7 +122,7 @@ section_option: Option = option(
 wait_option: Option = option(
     "--wait",
     "S",
-    "With --node: longest wait [s] for the monitor, and again for its answer.",
+    "With --node: longest wait [s] for the monitor, and then for its answer.",
     "wait_s",
     type=POSITIVE,
     default=10.0,
@@ -133,7 +133,7 @@ workers_option: Option = option(
 scheduler_option: Option = option(
     "--scheduler",
     "ADDRESS",
-    "Dask scheduler whose workers compute in place of this machine, tcp://HOST:PORT.",
+    "Dask scheduler, tcp://HOST:PORT; its workers compute instead of this machine.",
 )
 recordings_argument: Option = click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."
@@ -142,7 +142,7 @@ recordings_argument: Option = click.argument(
 
 def json_option(what: str) -> Option:
     """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
-    text = f"Write {what} as JSON; - for stdout, without other output there."
+    text = f"Write {what} as JSON; - writes it to stdout, and nothing else."
     return option("--json", "FILE", text, "json_file", type=click.Path(allow_dash=True, path_type=Path))
 
 

@@ -218,7 +218,7 @@ def _crank(found: Found) -> Iterator[Item]:
         "crank.gear_ratio",
         value=ratio,
         sigma=one.gear_ratio * one.sigma["ratio"] / abs(one.ratio),
-        remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a fraction of small numbers",
+        remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a ratio of small whole numbers",
     )
     yield Item(
         name="crank.offset_rad",
@@ -252,7 +252,7 @@ def _torque(found: Found) -> Iterator[Item]:
     yield Item(
         name="drive_torque.sampling",
         value=found.sampling or found.base.drive_torque.sampling,
-        remark=found.why_sampling if found.sampling else "as given: not enough to tell",
+        remark=found.why_sampling if found.sampling else "kept as given: not determined",
     )
 
 
@@ -349,7 +349,7 @@ def findings(found: Found, mechanism: Mechanism) -> Iterator[str]:
         force, sigma = one.linear["load"] / one.gain, one.sigma["load"] / abs(one.gain)
         yield (
             f"a foot load of {force:.3g} N ± {sigma:.2g} N explains most of the torque that does not fit; "
-            "the proposal allows for it, but record with the foot in the air"
+            "the proposal corrects for this load; it is better to record with the foot in the air"
         )
     if not found.doubts:  # friction and phases say nothing about an unknown leg
         yield from _of_known_leg(found, mechanism)
@@ -397,7 +397,7 @@ def notes(found: Found) -> Iterator[str]:
     ratio = gear(found)[0]
     if ratio != 1.0 and len(found.fit.offset_rad) == 1:
         is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
-        seems = "its first reading is 0" if is_zero else "motor encoders often do"
+        seems = "its first reading is 0" if is_zero else "motor encoders often start at zero"
         yield (
             f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each boot "
             f"({seems}), the offset is valid until the next boot: set crank.zero to at_start"
@@ -406,7 +406,7 @@ def notes(found: Found) -> Iterator[str]:
         if topic != f"/{name}" and not (name == "drive_torque" and topic == joint.topic):
             yield f"start the monitor with -r {name}:={topic}, replay with --{name.replace('_', '-')} {topic}"
     if torque.source == FLOAT64:
-        yield "a Float64 has no stamp: the torque has its time of arrival, so delayed messages are a lag"
+        yield "a Float64 has no stamp: the torque is stamped on arrival, so a late message looks like a lag"
     speeds = cadences_rpm(found.fit)
     if len(speeds) > 1:
         each = " and ".join(f"{speed:g}" for speed in speeds)

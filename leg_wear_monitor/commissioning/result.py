@@ -169,6 +169,6 @@ class CommissioningResult:
         """
         if self.config is None:
             raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
-        labels = {"not enough to tell": self.not_told, "does not fit": self.findings, "note": self.notes}
+        labels = {"not determined": self.not_told, "does not fit": self.findings, "note": self.notes}
         remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
         return parameter_text(self.config, remarks)

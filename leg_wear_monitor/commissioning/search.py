@@ -276,6 +276,6 @@ def _doubt(name: str, best: Candidate, rival: Candidate) -> str:
             "select one with --drive-torque"
         )
     return (
-        f"the torque of this leg looks nearly the same the other way round ({less}); walk faster, where "
-        "inertia shapes the torque, or turn the crank by hand and look"
+        f"the torque of this leg looks nearly the same in the other direction ({less}); walk faster, so that "
+        "inertia shapes the torque, or turn the crank by hand and look at the joint's position"
     )

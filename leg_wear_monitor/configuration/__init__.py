@@ -14,7 +14,7 @@ import attrs
 # A key of a file with its unit, bounds and meaning, declared once for checks and documentation.
 
 
-USUAL = "{value:g} {unit}, usual are {usual} {unit}"
+USUAL = "{value:g} {unit}, usually {usual} {unit}"
 LEAST = 1.0e-30  # least positive value: in SI units, its square and its inverse stay finite
 
 

@@ -316,7 +316,7 @@ def _read_text(path: Path, source: str) -> str:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise ConfigError(source, "", f"cannot be read: {reason}") from error
     if len(content) > MOST_BYTES:
-        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is not a configuration")
+        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes. Expected a configuration")
     return content.decode("utf-8")
 
 

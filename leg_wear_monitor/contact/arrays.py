@@ -101,8 +101,8 @@ def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
         raise ConfigError(
             source,
             f"clearances.joints.{name}.stiffness",
-            f"{settings.stiffness:g} N/m^1.5 is for Hertz's force, normal_law {settings.normal_law!r} has "
-            "another; leave the key out or choose another law",
+            f"{settings.stiffness:g} N/m^1.5 is for Hertz's force. normal_law {settings.normal_law!r} does "
+            "not use it: remove the key or choose a different law",
         )
 
 

@@ -134,7 +134,7 @@ class LiveLeg:
         self._waited_for = ", ".join(map(printable, waited_for))
         self._lock = threading.Lock()
         self._setup: LegSetup | None = None
-        self._why_unknown = "The monitor has not told its parameters yet."
+        self._why_unknown = "The monitor has not sent its parameters yet."
         self._state, self._fault = NOTHING_KNOWN, ""
         self._statuses: dict[str, ReplayStatus] = {}
         self._leg_silent_s: float | None = None
@@ -208,7 +208,7 @@ class LiveLeg:
         return leg_content(now, printable(self._node), self.freshness(), why_unknown, self._charts(now))
 
     def freshness(self) -> Freshness:
-        """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
+        """Since when the monitor has sent no message; or, if it sends, since when it has no data."""
         with self._lock:
             arrived_s, leg_s = self._arrived_s, self._leg_silent_s
         if arrived_s is None:
@@ -219,7 +219,7 @@ class LiveLeg:
                 OLD_AFTER_S,
             )
         age_s = self._clock() - arrived_s
-        silence = "nothing is heard of the monitor; is it running?"
+        silence = "no message from the monitor. Is it running?"
         if leg_s is not None and age_s < OLD_AFTER_S:
             age_s += leg_s
             silence = "the monitor runs, but receives nothing from the leg; see its status below"
@@ -234,7 +234,7 @@ class LiveLeg:
 
     def _now(self) -> ReplaySummary:
         setup, gait = self._setup or unknown_leg(), self._statuses.get("gait")
-        missing = "" if self._state.life_cycles else gait.message if gait else "nothing was heard"
+        missing = "" if self._state.life_cycles else gait.message if gait else "no message was received"
         history = _history(self._rows, setup.monitor.clearance_joints)
         return summary_of_now(setup, self._state, history, list(self._statuses.values()), missing)
 

@@ -276,7 +276,7 @@ _REASONS = {
     STEP_TOO_SMALL: (
         "the integration step became too small; check for a mass, inertia or stiffness far out of range"
     ),
-    SINGULAR: "the closures became singular; check for a dead point, or try smaller clearances",
+    SINGULAR: "the linkage became singular; check for a dead point, or try smaller clearances",
     PUSHED_THROUGH: (
         "the journal was pushed through a tenth of the bushing's radius; "
         "try a lower speed, a smaller clearance or a higher stiffness"

@@ -380,7 +380,7 @@ def _check_intervals(intervals: int | None, model: str) -> None:
     if intervals is None:
         return
     if model != "clearance":
-        raise ConfigError("intervals", "", f"{intervals} is for model clearance, model {model} has none")
+        raise ConfigError("intervals", "", f"{intervals} is for model clearance only, not for model {model}")
     if not LEAST_INTERVALS <= intervals <= MOST_INTERVALS:
         expected = f"Expected {LEAST_INTERVALS} to {MOST_INTERVALS} per gait cycle"
         raise ConfigError("intervals", "", f"{intervals} is out of bounds. {expected}")
@@ -485,7 +485,9 @@ def _turned(source: str, angles: Floats) -> float:
     """Net turns of a crank from its angles (n,) [turns]; warns of one that swings."""
     turned, path = float(angles[-1] - angles[0]), float(np.abs(np.diff(angles)).sum())
     if path > _MOST_PATH * abs(turned) + _ROUNDING:
-        fault = f"the crank swings, {path:.3g} turns to and fro for {abs(turned):.3g} turns in all"
+        fault = (
+            f"the crank swings back and forth: {path:.3g} turns of motion give {abs(turned):.3g} net turns"
+        )
         text = f"{source}: {fault}; values per gait cycle have no meaning"
         warnings.warn(text, ConfigWarning, stacklevel=4)
     return turned

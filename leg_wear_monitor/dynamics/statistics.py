@@ -104,8 +104,9 @@ def open_balance(result: SimulationResult) -> str | None:
     if abs(energy.residual) <= most:
         return None
     return (
-        f"the energy does not close, with a residual of {energy.residual:.3g} J and losses of {lost:.3g} "
-        "J; forces and wear of model clearance may be off, try --model full"
+        f"the energy balance does not close: its residual is {energy.residual:.3g} "
+        f"J, its losses are {lost:.3g} "
+        "J. Forces and wear may be wrong. Use --model full"
     )
 
 

@@ -148,7 +148,7 @@ class _Leg:
     ) -> None:
         toe = linkage.mechanism.toe
         if toe is None:
-            raise RuntimeError("a mechanism without a toe does not stand")
+            raise RuntimeError("a mechanism without a toe cannot stand")
         self._stance, self._friction = nominal_stance(linkage), friction
         self.near_n = 0.0  # about the size: shapes differ in proportion to it
         _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)

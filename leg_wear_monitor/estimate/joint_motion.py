@@ -108,7 +108,7 @@ def why_not_a_crank(joint: Series) -> str:
     for turn, unit in ((1.0, "turns"), (360.0, "degrees")):
         travel = np.ptp(np.unwrap(joint.value, period=turn))
         if np.ptp(joint.value) < 1.1 * turn and travel > _LEAST_TURNS * turn:  # with some noise
-            return f"seems to be in {unit}, wrapped to a turn: publish radians"
+            return f"seems to be in {unit}, wrapped to a turn. Publish radians"
     reach = float(np.ptp(position))
     if reach < _LEAST_TRAVEL_RAD:
         return f"moves by {reach:.2g} rad in all"
@@ -116,7 +116,7 @@ def why_not_a_crank(joint: Series) -> str:
     path = float(np.abs(np.diff(coarse)).sum())
     if reach < _ROCKING * path:
         return f"swings to and fro within {reach:.2g} rad"
-    return "" if len(_long_enough(joint)) else "has no recording that is long enough to be smoothed"
+    return "" if len(_long_enough(joint)) else "has no recording long enough for smoothing"
 
 
 def motion_of(joint: Series) -> JointMotion:

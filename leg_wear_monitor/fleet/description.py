@@ -141,7 +141,7 @@ choose(Patterns, lambda value: (tuple[str, ...] if isinstance(value, list) else 
 class Defaults:
     """Values for legs that have none of their own."""
 
-    config: str = described("parameter file of the monitor; empty: the one of the package", default="")
+    config: str = described("parameter file of the monitor; if empty, the package's parameters", default="")
 
 
 @attrs.frozen(kw_only=True)
@@ -159,8 +159,8 @@ class LegEntry:
         "topic",
         default="",
     )
-    joint_states: str = described("topic of the crank; if empty, found by its name", default="")
-    drive_torque: str = described("topic of the drive torque; if empty, found by its name", default="")
+    joint_states: str = described("topic of the crank; if empty, it is found by its name", default="")
+    drive_torque: str = described("topic of the drive torque; if empty, it is found by its name", default="")
 
 
 @attrs.frozen(kw_only=True)
@@ -282,7 +282,7 @@ def _check_names(legs: Iterable[LegEntry], source: str) -> None:
     for leg in legs:
         if leg.id.casefold() in known:
             other = known[leg.id.casefold()]
-            raise ConfigError(source, "legs", f"the id {leg.id} is given twice, first as {other}")
+            raise ConfigError(source, "legs", f"the id {leg.id} occurs twice, first as {other}")
         known[leg.id.casefold()] = leg.id
 
 

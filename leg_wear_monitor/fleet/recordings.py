@@ -79,7 +79,7 @@ class ReadRecording:
         """One line if the operator must know of it; empty otherwise."""
         if self.is_counted and not self.is_partial:
             return ""
-        words = "counted in part" if self.is_counted else self.outcome.replace("_", " ")
+        words = "added in part" if self.is_counted else self.outcome.replace("_", " ")
         return "; ".join([f"{self.file}: {words}", *self.findings[:1]])
 
 

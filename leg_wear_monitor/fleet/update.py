@@ -236,7 +236,7 @@ def _line(about: ReadRecording, result: ReplayResult) -> ReadRecording:
         texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
     elif monitor.is_all_counted:
         outcome = Outcome.ALREADY_COUNTED
-        texts.insert(0, "the ledger has all of its time from other recordings: a copy, or a wrong clock")
+        texts.insert(0, "the ledger has this time already: the recording is a copy, or its clock is wrong")
     is_counted = outcome is Outcome.COUNTED
     return attrs.evolve(
         about,

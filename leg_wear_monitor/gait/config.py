@@ -68,11 +68,13 @@ class EncoderConfig:
     rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     noise_rad: float = _not_negative("rad", "noise of the angle, standard deviation", 1.0e-3)
     velocity_noise_radps: float = _not_negative("rad/s", "noise of the velocity, standard deviation", 0.05)
-    counts_per_turn: float = _not_negative("", "steps of the angle per turn, 0 for none", 16384.0)
+    counts_per_turn: float = _not_negative(
+        "", "steps of the angle per turn; 0 for a continuous angle", 16384.0
+    )
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
     restarts_s: tuple[float, ...] = _not_negative(
-        "s", "times at which the encoder starts anew at 0; none if empty", ()
+        "s", "times at which the encoder restarts at 0; empty for never", ()
     )
 
 
@@ -175,14 +177,15 @@ class LoadConfig:
     )
     vertical_waves: tuple[float, ...] = quantity(
         "",
-        "own vertical shape: coefficients of sin(k pi s), s from 0 to 1 in stance; none if empty",
+        "vertical shape, as coefficients of sin(k pi s) with s from 0 to 1 in "
+        "stance; if empty, the shape above applies",
         default=(),
     )
     fore_aft_waves: tuple[float, ...] = quantity(
-        "", "own fore-aft shape, likewise; positive values brake", default=()
+        "", "fore-aft shape in the same form; positive values brake", default=()
     )
     heel_strike_shift: float = _shift("delay of the heel strike from its nominal phase, in gait cycles")
-    toe_off_shift: float = _shift("delay of the toe-off, likewise")
+    toe_off_shift: float = _shift("delay of the toe-off from its nominal phase, in gait cycles")
     amplitude_scatter: float = _fraction(
         "standard deviation of the ground's force from step to step, over its mean", 0.1, at_most=0.3
     )

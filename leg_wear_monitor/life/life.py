@@ -112,19 +112,21 @@ class LifeSettings:
         Seed of the legs' start positions.
     """
 
-    legs: int = quantity("", "legs whose wear is averaged, alike but for their start", at_least=1, default=2)
-    cycles: int = quantity("", "gait cycles of each that are averaged, before a jump", at_least=2, default=4)
+    legs: int = quantity(
+        "", "legs whose wear is averaged; they differ in their start only", at_least=1, default=2
+    )
+    cycles: int = quantity("", "gait cycles per leg that are averaged before a jump", at_least=2, default=4)
     settle_cycles: int = quantity(
-        "", "gait cycles before those, since the surfaces have changed", at_least=0, default=1
+        "", "gait cycles to settle on the changed surfaces before that", at_least=0, default=1
     )
     perturb_fraction: float = quantity(
         "",
-        "journals start up to this fraction of the smallest clearance from the centre",
+        "largest distance of a journal from the centre at the start, as a fraction of the smallest clearance",
         within=(0.0, 1.0),
         default=0.5,
     )
-    jump: JumpControl = described("how far a jump may go", factory=JumpControl)
-    seed: int = quantity("", "of where legs start", at_least=0, default=0)
+    jump: JumpControl = described("limits of a jump", factory=JumpControl)
+    seed: int = quantity("", "seed of the starts", at_least=0, default=0)
 
 
 class LifeRun:
@@ -335,8 +337,9 @@ def simulate_life(
     while run.points[-1].cycles < horizon_cycles:
         if len(run.points) > MOST_JUMPS:
             raise SimulationError(
-                f"the life does not end within {MOST_JUMPS} jumps, it is at {run.points[-1].cycles:.3g} "
-                f"of {horizon_cycles:.3g} gait cycles; try longer jumps or a nearer limit"
+                f"the life does not end within {MOST_JUMPS} jumps, it has "
+                f"reached {run.points[-1].cycles:.3g} "
+                f"of {horizon_cycles:.3g} gait cycles; use longer jumps or a smaller limit"
             )
         opened = run.points[-1].opened_m
         fractions = opened / (limits - run.fresh_m)

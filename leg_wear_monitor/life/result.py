@@ -35,7 +35,7 @@ _HOURS_OF_A_DAY = 24.0
 
 def _check(_duty: object, _field: object, hours_by_peak: Mapping[float, float]) -> None:
     if not hours_by_peak:
-        raise ConfigError("duty", "", "has no load. Expected such as 0:2,300:5,600:1 (N:hours a day)")
+        raise ConfigError("duty", "", "has no load. Expected for example 0:2,300:5,600:1 (N:hours per day)")
     for peak, hours in hours_by_peak.items():
         if not 0.0 <= peak <= _MOST_N:
             raise ConfigError("duty", "", f"{peak:g} N is not a peak from 0 to {_MOST_N:g} N")
@@ -43,7 +43,7 @@ def _check(_duty: object, _field: object, hours_by_peak: Mapping[float, float]) 
             raise ConfigError("duty", "", f"{hours:g} h at {peak:g} N is not a time above 0 h")
     whole = sum(hours_by_peak.values())
     if whole > _HOURS_OF_A_DAY:
-        raise ConfigError("duty", "", f"{whole:g} h a day together are more than {_HOURS_OF_A_DAY:g} h")
+        raise ConfigError("duty", "", f"{whole:g} h per day in total are more than {_HOURS_OF_A_DAY:g} h")
 
 
 @attrs.frozen
@@ -83,10 +83,10 @@ class Duty:
             try:
                 peak, hours = (float(value) for value in part.split(":"))
             except ValueError:
-                fault = f"{part!r} is not N:hours a day. Expected such as 0:2,300:5,600:1"
+                fault = f"{part!r} is not N:hours per day. Expected for example 0:2,300:5,600:1"
                 raise ConfigError("duty", "", fault) from None
             if peak in found:
-                raise ConfigError("duty", "", f"{peak:g} N is there twice")
+                raise ConfigError("duty", "", f"{peak:g} N occurs twice")
             found[peak] = hours
         return cls(found)
 

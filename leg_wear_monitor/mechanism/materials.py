@@ -26,7 +26,7 @@ class Side:
     wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "wear coefficient of this body")
     roughness: SourcedValue | None = sourced("roughness", "Ra that the source asks for")
     is_counted: bool = described(
-        "false if the source measures the wear of the other body only",
+        "false if the source gives only the wear of the other body",
         default=True,
     )
 
@@ -346,7 +346,7 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
     for joint in joints:
         settings = mechanism.clearances[joint]
         wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
-        wear = "not known: not counted" if lacks_wear(settings) else wear
+        wear = "not known: no wear is modelled" if lacks_wear(settings) else wear
         found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found
 
@@ -354,7 +354,7 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
 def regime_of(settings: Clearance) -> str:
     """Validity of a joint's wear coefficient: its pair and the pair's regime."""
     if not settings.material:
-        return "no material named, regime unknown"
+        return "no material is named, so the regime is not known"
     pair = load_material(settings.material)
     own = "" if lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients else _BESIDE
     return f"{own}{pair.name} ({pair.regime})"

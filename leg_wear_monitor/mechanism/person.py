@@ -196,7 +196,7 @@ def nominal_stance(linkage: Linkage) -> Stance:
     back = np.sign(along[0])
     forth = np.flatnonzero(back * along <= 0.0)
     if not forth.size:
-        raise ConfigError(mechanism.source, "bodies", "has a toe that does not move to and fro")
+        raise ConfigError(mechanism.source, "bodies", "has a toe that does not move back and forth")
     end, begin = int(forth[0]), int(forth[-1]) - _POINTS
     middle, half = lowest + 0.5 * (begin + end), 0.5 * _STANCE * (end - begin)
     ends = [float(at / _POINTS % 1.0) for at in (middle - half, middle + half)]
@@ -230,7 +230,9 @@ def read_toe_force(path: Path) -> Floats:
     angle, up, along = (_column(path, rows, name) for name in _OF_FORCE)
     way = np.diff(angle)
     if len(way) < _LEAST_ROWS or not ((way > 0.0).all() or (way < 0.0).all()) or np.ptp(angle) > TURN:
-        fault = f"expected at least {_LEAST_ROWS + 1} rows of one gait cycle, in the order of their angles"
+        fault = (
+            f"too few rows, or not in order. Expected {_LEAST_ROWS + 1} or more of one gait cycle, by angle"
+        )
         raise ConfigError(str(path), _OF_FORCE[0], fault)
     widest = max(float(np.abs(way).max()), TURN - float(np.ptp(angle)))
     if widest > TURN / _LEAST_ROWS:
@@ -241,7 +243,7 @@ def read_toe_force(path: Path) -> Floats:
         fault = f"{peak_n:.3g} N at most and {up.min():.3g} N at least. Expected a ground that pushes up"
         raise ConfigError(str(path), _OF_FORCE[1], fault)
     if not least_n <= peak_n <= most_n:
-        fault = f"{peak_n:.3g} N at most, usual are {least_n:g} to {most_n:g} N; a unit other than N?"
+        fault = f"{peak_n:.3g} N at most, usually {least_n:g} to {most_n:g} N. Is it in a different unit?"
         warnings.warn(f"{path}: {_OF_FORCE[1]}: {fault}", ConfigWarning, stacklevel=2)
     at = np.arange(PHASES) * (TURN / PHASES)
     return np.stack([np.interp(at, angle, force, period=TURN) for force in (along, up)], axis=1)

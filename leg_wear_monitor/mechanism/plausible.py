@@ -55,15 +55,18 @@ def _beyond(value: float, least: float, most: float) -> bool:
 def _lengths(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     name, length = largest_link(mechanism)
     if _beyond(length, *_USUAL_LENGTH):
-        slip = "mm for m" if length > 5.0 else "km for m"
+        slip = "mm" if length > 5.0 else "km"
         yield Doubt(
-            f"bodies.{name}.points", f"{length:g} m from point to point, usual are 0.005 to 5 m; {slip}?"
+            f"bodies.{name}.points",
+            f"{length:g} m from point to point, usually 0.005 to 5 m. Is it in {slip}?",
         )
         return
     for name, body in mechanism.bodies.items():
         away = math.hypot(*body.com)
         if away > 20.0 * max(span(body.points), 0.05 * length):
-            yield Doubt(f"bodies.{name}.com", f"{away:g} m away from a link that is far shorter; mm for m?")
+            yield Doubt(
+                f"bodies.{name}.com", f"{away:g} m away from a link that is much shorter. Is it in mm?"
+            )
 
 
 def _angles(mechanism: spec.Mechanism) -> Iterator[Doubt]:
@@ -72,7 +75,7 @@ def _angles(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     name = max(angles, key=lambda each: abs(angles[each]))  # where one is in degrees, all are
     if _beyond(angles[name], 0.0, TURN):
         turns = angles[name] / TURN
-        yield Doubt(f"assembly.{name}", f"{angles[name]:g} rad is {turns:.3g} turns; degrees for rad?")
+        yield Doubt(f"assembly.{name}", f"{angles[name]:g} rad is {turns:.3g} turns. Is it in degrees?")
 
 
 def _speed(mechanism: spec.Mechanism) -> Iterator[Doubt]:
@@ -87,9 +90,9 @@ def _speed(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     # a speed that was converted is a whole number of rpm; one that is a whole number of rad/s may be rpm
     if _beyond(speed, 0.0, 20.0) and speed == round(speed) and abs(rpm - round(rpm)) > _ROUND:
         meant = f"{speed:g} rpm is {speed * TURN / 60.0:.6g} rad/s"
-        yield Doubt(key, f"{speed:g} rad/s is {rpm:.4g} rpm; rpm for rad/s? {meant}")
+        yield Doubt(key, f"{speed:g} rad/s is {rpm:.4g} rpm. Is it in rpm? {meant}")
     elif _beyond(rpm, 0.1, 30_000.0):
-        yield Doubt(key, f"{speed:g} rad/s is {rpm:.3g} rpm, usual are 0.1 to 30000 rpm")
+        yield Doubt(key, f"{speed:g} rad/s is {rpm:.3g} rpm, usually 0.1 to 30000 rpm")
 
 
 def _masses(mechanism: spec.Mechanism) -> Iterator[Doubt]:
@@ -105,18 +108,18 @@ def _inertia(name: str, body: spec.Body, length: float) -> Iterator[Doubt]:
     """Doubt about an inertia with a radius of gyration above 10 or below 0.001 times the largest link."""
     gyration = math.sqrt(body.inertia / body.mass)
     if _beyond(gyration, 1.0e-3 * length, 10.0 * length):
-        slip = "kg mm^2 for kg m^2" if gyration > length else "t m^2 for kg m^2"
+        slip = "kg mm^2" if gyration > length else "t m^2"
         yield Doubt(
             f"bodies.{name}.inertia",
-            f"{body.inertia:g} kg m^2 of {body.mass:g} kg is a radius of gyration of {gyration:.3g} m beside "
-            f"links of {length:.3g} m; {slip}?",
+            f"{body.inertia:g} kg m^2 of {body.mass:g} kg is a radius of gyration of {gyration:.3g} m with "
+            f"links of {length:.3g} m. Is it in {slip}?",
         )
 
 
 def _gravity(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     pull = math.hypot(*mechanism.gravity)
     if pull > 30.0:
-        yield Doubt("gravity", f"{pull:g} m/s^2, on earth it is 9.81 m/s^2; mm/s^2 for m/s^2?")
+        yield Doubt("gravity", f"{pull:g} m/s^2, on earth it is 9.81 m/s^2. Is it in mm/s^2?")
 
 
 def _joints(mechanism: spec.Mechanism) -> Iterator[Doubt]:
@@ -134,11 +137,14 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     if fault := ratio_fault(c.radial_clearance, c.bushing_radius):
         yield Doubt("radial_clearance", fault)
     if lacks_wear(c):
-        fault = "gives no wear coefficient, so the joint does not wear. Expected wear_coefficient next to it"
+        fault = (
+            "gives no wear coefficient, so the joint does not wear. Expected "
+            "wear_coefficient next to material"
+        )
         yield Doubt("material", f"{c.material} {fault}")
     spread = spread_of(c, math.inf)
     if spread is not None and spread < _LEAST_SPREAD:
-        fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}; of repeats instead of parts?"
+        fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}. Is it the spread of repeats?"
         yield Doubt("material", fault)
 
 
@@ -149,7 +155,7 @@ def ratio_fault(clearance_m: float, radius_m: float) -> str | None:
         return None
     return (
         f"{clearance_m:g} m is {100.0 * ratio:.3g} % of the bushing's radius of {radius_m:g} m, "
-        "usual are 0.01 to 5 %; a unit other than the radius?"
+        "usually 0.01 to 5 %. Is it in a different unit than the radius?"
     )
 
 
@@ -158,7 +164,7 @@ def _loads(mechanism: spec.Mechanism) -> Iterator[Doubt]:
         forces = load.force if isinstance(load, spec.PhaseLoad) else (load.force,)
         force = max((math.hypot(*each) for each in forces), default=0.0)
         if force > 1.0e5:
-            yield Doubt(f"loads.{name}.force", f"{force:g} N, usual are below 1e5 N; mN for N?")
+            yield Doubt(f"loads.{name}.force", f"{force:g} N, usually below 1e5 N. Is it in mN?")
 
 
 # Valid ranges of clearances and their limits, with a hint at the likely wrong unit of an invalid value.

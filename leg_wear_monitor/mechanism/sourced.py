@@ -91,7 +91,7 @@ def _interval(interval: tuple[float, float]) -> str | None:
 class SourcedValue:
     """A number with its source; a range alone stands for its middle."""
 
-    value: float | None = described("the number; without it, the middle of the range", default=None)
+    value: float | None = described("the number; without it, the middle of range", default=None)
     unit: str = described("its unit, from the table below")
     source: str = described("origin of the value: author, title, year, or page", check=_blank)
     conditions: str = described("test conditions, or conditions in which the value is valid", check=_blank)
@@ -133,7 +133,7 @@ class WearCoefficient(SourcedValue):
     """A wear coefficient; a dimensionless K comes with the hardness that it belongs to."""
 
     hardness: SourcedValue | None = described(
-        "hardness that a dimensionless K is divided by",
+        "hardness by which a dimensionless K is divided",
         default=None,
         check=lambda value: unit_fault("pressure", value),
     )

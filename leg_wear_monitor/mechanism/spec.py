@@ -25,7 +25,7 @@ def _rises(ramp: tuple[float, float]) -> str | None:
 class Friction:
     """Coulomb friction with a ramp around zero slip speed."""
 
-    law: str = choice(FRICTION_LAWS, "shape of the ramp", default="ambrosio")
+    law: str = choice(FRICTION_LAWS, "shape of the friction over the slip speed", default="ambrosio")
     coefficient: float = quantity("", "friction coefficient", within=(0.0, 2.0), default=0.0)
     ramp: tuple[float, float] = quantity(
         "m/s",
@@ -37,16 +37,16 @@ class Friction:
 
 
 def _length_slip(metres: float) -> str:
-    return f"{USUAL}; {'mm' if metres > 1.0e-3 else 'km'} for m?"
+    return f"{USUAL}. Is it in {'mm' if metres > 1.0e-3 else 'km'}?"
 
 
 def _modulus_slip(modulus: float) -> str:
     meant = "GPa" if modulus < 1.0e4 else "MPa" if modulus < 1.0e6 else "kPa"
-    return f"{USUAL}, steel has 2.1e11; {meant} for Pa?"
+    return f"{USUAL}; steel has 2.1e11 Pa. Is it in {meant}?"
 
 
 USUAL_WEAR = 0.0, 1.0e-9  # 1/Pa
-WEAR_SLIP = f"{USUAL}; K for K/H, 1/MPa for 1/Pa, or mm^3/(N m), which is 1e-9 1/Pa?"
+WEAR_SLIP = f"{USUAL}. Is it K instead of K/H, or in 1/MPa or mm^3/(N m)? 1 mm^3/(N m) is 1e-9 1/Pa"
 
 
 @attrs.frozen(kw_only=True)
@@ -122,7 +122,7 @@ Vector = tuple[float, float]
 
 _TORQUE_SLIP = f"{USUAL}; N mm for N m?"
 Pose = tuple[float, float, float]
-Torques = Annotated[tuple[float, ...], "one for each phase"]  # in a file, one number is a constant torque
+Torques = Annotated[tuple[float, ...], "one per phase"]  # in a file, one number is a constant torque
 Label = Annotated[str, "in a file, not empty"]
 
 GROUND = "ground"
@@ -136,7 +136,7 @@ class Ground:
 
 
 def _mass_slip(kg: float) -> str:
-    return f"{USUAL}; {'g' if kg > 1.0 else 't'} for kg?"
+    return f"{USUAL}. Is it in {'g' if kg > 1.0 else 't'}?"
 
 
 @attrs.frozen(kw_only=True)

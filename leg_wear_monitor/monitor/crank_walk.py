@@ -117,7 +117,7 @@ def _why_none(crank: Series, cadence: Cadence) -> str:
     if abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
         return ""
     return (
-        f"the leg walks at {rpm:.3g} rpm, the commanded cadence is {cadence.commanded_rpm:.3g} ± "
+        f"the leg walks at {rpm:.3g} rpm; the commanded cadence is {cadence.commanded_rpm:.3g} ± "
         f"{cadence.tolerance_rpm:.2g} rpm"
     )
 
@@ -174,7 +174,9 @@ def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
     if not found:
         return "there is no drive torque"
     if found < _LEAST_SAMPLES * walk.turns:
-        return f"the drive torque has {found} samples in {walk.turns} turns. Expected {_LEAST_SAMPLES} a turn"
+        return (
+            f"the drive torque has {found} samples in {walk.turns} turns. Expected {_LEAST_SAMPLES} per turn"
+        )
     pair = paired(motion_of(walk.crank), walk.torque)
     if len(pair.torque) < _LEAST_SAMPLES or not float(pair.torque.std()) > 0.0:
         return "the drive torque does not change"
@@ -235,7 +237,8 @@ def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
         )
     if rivals and torque_fit.too_alike(best, rivals[0]):
         return (
-            f"{_angle(best):.2f} and {_angle(rivals[0]):.2f} rad explain the drive torque nearly alike "
+            f"{_angle(best):.2f} and {_angle(rivals[0]):.2f} rad explain "
+            "the drive torque almost equally well "
             f"(mismatch {best.mismatch:.2f} and {rivals[0].mismatch:.2f})"
         )
     if best.sigma["offset_rad"] > _SURE_RAD:

@@ -250,7 +250,7 @@ class CrankZero(Observer):
         turns = f"{min(state.turns, LEAST_TURNS)} of {LEAST_TURNS} turns"
         if state.turns > LEAST_TURNS:
             turns = f"{state.turns} turns were not enough"
-        return f"the crank's zero is being found: {turns}" + (f", {state.why}" if state.why else "")
+        return f"searching for the crank's zero: {turns}" + (f", {state.why}" if state.why else "")
 
     @property
     def unmonitored_s(self) -> float:

@@ -58,7 +58,7 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
     stood = cycle.stamp_ns - cycle.begin_ns > LONGEST * 1.0e9 * cycle.moving_s
     if not (stood or _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST):
         found.append(
-            f"the crank turns at {cycle.cadence_rpm:.3g} rpm, the commanded cadence is {commanded:.3g} rpm"
+            f"the crank turns at {cycle.cadence_rpm:.3g} rpm; the commanded cadence is {commanded:.3g} rpm"
         )
     if cycle.torque_samples:
         predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
@@ -70,7 +70,7 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
             )
         elif not (differs := _difference(cycle)) < _UNLIKE:
             found.append(
-                "the drive torque does not resemble the predicted one: they differ by "
+                "the drive torque does not resemble the predicted torque: they differ by "
                 f"{differs:.2g} times the predicted torque"
             )
     return found
@@ -152,7 +152,7 @@ class GaitEvidence:
             short = "a whole gait cycle" if turns < 1.0 else "two turns, in which there is a whole gait cycle"
             return f"the crank turns {turns:.2f} times in {self._passed_s:.3g} s: less than {short}"
         if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
-            return f"the crank turns at {rpm:.3g} rpm, the commanded cadence is {abs(commanded):.3g} rpm"
+            return f"the crank turns at {rpm:.3g} rpm; the commanded cadence is {abs(commanded):.3g} rpm"
         return f"the crank turns {turns:.3g} times, but the monitor cannot track a whole gait cycle"
 
 

@@ -151,12 +151,12 @@ _SENTENCES = {
     "not_finite": "have a value that is NaN or infinite ({where})",
     "undecodable": "cannot be decoded: wrong type or encoding",
     "wrong_type": "are of a type that is not read",
-    "out_of_range": "have an impossible value or a torque far from the others (units are rad and N m)",
+    "out_of_range": "have an impossible value or a torque far from the other torques (units are rad and N m)",
     "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
     "late": "arrive more than 20 ms after newer ones",
-    "stray_stamps": "have a stamp far from the others: see the clock of the sender",
-    "outliers": "have an angle far from the motion of the others",
-    "load_outliers": "have a foot load far from the samples before and after: see the cable of the sensor",
+    "stray_stamps": "have a stamp far from the other stamps: check the clock of the sender",
+    "outliers": "have an angle far from the motion of the crank",
+    "load_outliers": "have a foot load far from the samples before and after: check the cable of the sensor",
 }
 
 _STREAMS = {CRANK: "the crank", TORQUE: "drive_torque", LOAD: "foot_load"}
@@ -457,7 +457,7 @@ INPUT_RULES = (
         kind=CRANK,
         words=_unit,
         needs_motion=False,
-        why="the crank's angle turns at {size} of the commanded cadence, as an angle in turns does",
+        why="the crank angle advances at {size} of the commanded cadence: its unit seems to be turns",
         do="publish radians, or set table.units.crank_angle of a table; for a continuous position in turns, "
         "set crank.gear_ratio to {ratio}",
     ),
@@ -466,14 +466,16 @@ INPUT_RULES = (
         kind=CRANK,
         words=_stamps,
         why="the stamps of the crank scatter by {size} ({percent} % of the sampling period), and its angle "
-        "does not: they are stamps of the arrival",
+        "does not: the samples are stamped on arrival",
         do="let the driver stamp each sample when it is measured (header.stamp)",
     ),
     InputRule(
         code="CRANK_HELD",
         kind=CRANK,
         words=lambda one: _held(one.angle, one.crank_ns, one.speed),
-        why="the crank's angle changes with every {size}th sample only, at {rate} Hz: it is held in between",
+        why=(
+            "the crank angle changes only with every {size}th sample, at {rate} Hz: it is repeated in between"
+        ),
         do="publish each angle once, with the stamp of its measurement; in a table, delete the repeated rows",
     ),
     InputRule(
@@ -521,8 +523,8 @@ INPUT_RULES = (
         code=NOT_OF_GAIT,
         kind=TORQUE,
         words=None,
-        why="the drive torque does not follow the gait since {since}: it is neither as predicted nor as in "
-        "the step before" + _NO_JOINT,
+        why="the drive torque does not follow the gait since {since}: it resembles neither the prediction "
+        "nor the previous step" + _NO_JOINT,
         do="check topic, unit and source of the drive torque; until then, rock the joints by hand regularly",
     ),
 )

@@ -328,13 +328,13 @@ class InputGuard:
         """Reason why crank samples are withheld at present, and the remedy; empty if none are."""
         if self.sources > 1:
             return (
-                "two series of crank angles interleave and disagree: two publishers of one crank, or an "
-                "encoder that jumps; nothing is monitored until one is left"
+                "two sources of the crank angle disagree: two publishers of one crank, or an encoder that "
+                "jumps. Nothing is monitored until one source is left"
             )
         ratio = self.speed_ratio
         if math.isnan(ratio):
             return ""
-        text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
+        text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, so nothing is monitored: "
         if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
             return (
                 text + "it seems to be in degrees; publish radians, or set table.units.crank_angle of a table"

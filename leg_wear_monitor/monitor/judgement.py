@@ -194,7 +194,7 @@ def _unfollowed(leg: MonitoredLeg) -> str:
     if leg.guard.cause:
         return leg.guard.cause
     out_s, cycle_s = leg.twin.intake.out_s, 60.0 / abs(leg.config.cadence.commanded_rpm)
-    return f"the crank has not been followed for {out_s:.3g} s" if out_s >= cycle_s else ""
+    return f"the crank has not been tracked for {out_s:.3g} s" if out_s >= cycle_s else ""
 
 
 # The state of the leg, from the data in the monitor.

@@ -235,7 +235,7 @@ def _ledger(accounting: Accounting) -> Status:
         return Status("ledger", Level.ERROR, message, values, LEDGER_NOT_WRITTEN)
     if ledger.cut_off_s is not None:
         values["cut_off_s"] = ledger.cut_off_s
-        message = "an earlier run was interrupted, the wear of its last seconds is lost"
+        message = "an earlier run was interrupted; the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values, LEDGER_INTERRUPTED)
     message = "is written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

@@ -81,7 +81,13 @@ def torque_status(
         messages += [f"the {alarm_specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet for a comparison"]
-    return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)
+    return Status(
+        "torque",
+        level,
+        "; ".join(messages or [("the measured torque agrees with the prediction")]),
+        values,
+        code,
+    )
 
 
 def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:

@@ -554,8 +554,8 @@ class WearMonitor:
         kept = self._leg.keep(closed=True)
         ledger.close()
         if not kept:
-            missing = "this run" if ledger.at_end else "what came after its last entry"
-            raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of {missing} is in it")
+            missing = "this run" if ledger.at_end else "the time after its last entry"
+            raise LedgerError(f"{ledger.path}: {ledger.fault}; it does not contain {missing}")
 
     def abandon(self) -> None:
         """Close the ledger without a further entry."""

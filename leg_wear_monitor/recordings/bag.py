@@ -145,7 +145,7 @@ def _storage(path: Path) -> str:
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
         remedy = _REMEDIES.get(path.suffix.lower())
-        text = remedy.format(path=path) if remedy else f"not a recording by its name. Expected {_EXPECTED}"
+        text = remedy.format(path=path) if remedy else f"not a recognised recording. Expected {_EXPECTED}"
         raise RecordingError(str(path), "", text)
     if not path.is_file():
         raise RecordingError(str(path), "", f"not a file. Expected {_EXPECTED}")
@@ -200,7 +200,7 @@ def find_topic(
     if given is not None:
         topic = "/" + given.lstrip("/")
         if topic not in recorded:
-            raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(recorded)}")
+            raise RecordingError(where, topic, f"is not a topic of the recording; it has {listed(recorded)}")
         return topic
     name, namespace = stream.topic, (beside or "").rpartition("/")[0]
     for topic in (f"{namespace}/{name}", f"/{name}"):
@@ -210,7 +210,7 @@ def find_topic(
         return None
     near = [topic for topic in recorded if topic.endswith(f"/{name}")]
     if len(near) > 1:
-        raise RecordingError(where, name, f"could be {listed(near)}, select one with {_option(stream)}")
+        raise RecordingError(where, name, f"could be {listed(near)}; select one with {_option(stream)}")
     return near[0] if near else None
 
 
@@ -354,7 +354,7 @@ def assign(
             for source in sources:
                 source.select(stream, topic)
             continue
-        text = f"is not a topic of the recording, it has {listed(recorded)}"
+        text = f"is not a topic of the recording; it has {listed(recorded)}"
         if set(recorded) - set(topics.values()):  # an unused topic may be it, renamed
             text += f"; select one with {_option(stream)}"
         if stream.is_needed:

@@ -137,7 +137,7 @@ class JointNames:
                 raise RecordingError(str(path), self._crank, file.twice)
             if file.count:
                 names = listed(sorted(file.names))
-                text = f"is not among the joints of {file.count} messages, they have {names}"
+                text = f"is not among the joints of {file.count} messages; they have {names}"
                 if not self._found:
                     remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
                     raise RecordingError(str(path), self._crank, f"{text}; {remedy}")

@@ -402,10 +402,10 @@ def _place(table: Table, column: Column) -> int:
     """Index of a column among the names of a table."""
     names = table.head.names
     if names.count(column.name) != 1:
-        what = "is there more than once" if column.name in names else "does not exist"
+        what = "occurs more than once" if column.name in names else "does not exist"
         may_be_none = column.key in (CRANK_SPEED, DRIVE_TORQUE, FOOT_LOAD, FOOT_LOAD_ALONG)
         nothing = ', or "" if there is none' if may_be_none else ""
-        line = f"; {table.head.taken} was taken for the names" if table.head.taken else ""
+        line = f"; {table.head.taken} was read as the names" if table.head.taken else ""
         fault = f"column {column.name!r} {what}{line}. Expected one of: {listed(names)}{nothing}"
         remedy = f"'leg-wear-monitor check {table.path}' proposes the parameters"
         raise RecordingError(str(table.path), column.parameter, f"{fault}. {remedy}")

@@ -31,7 +31,7 @@ class Head:
     lines : int
         Lines before the first row.
     taken : str
-        The line that was taken for the names, as ``line 1 ('time,angle')``; empty without such a line.
+        The line that was read as the names, as ``line 1 ('time,angle')``; empty without such a line.
     separator : str
     has_decimal_comma : bool
     """

@@ -30,7 +30,7 @@ def first_position(reach: Reach) -> int:
 def drawing_html(reach: Reach) -> str:
     """The page as HTML text."""
     mechanism, found, shown = reach.mechanism, findings(reach), first_position(reach)
-    text = "To scale, all joints without clearance."
+    text = "Drawn to scale, without clearances."
     if mechanism.toe is not None and len(reach.q) > 1:
         text += " Dashed: path of the toe."
     units = understood(reach.linkage) if reach.turns and not found else []

@@ -94,7 +94,7 @@ def time_unit(longest_s: float) -> tuple[float, str]:
     return (1.0 / 60.0, "min") if longest_s > 300.0 else (1.0, "s")
 
 
-# Series of a replay's summary over the time since the recording's begin.
+# Series of a replay's summary over the time since the start of the recording.
 
 
 def time_of(summary: ReplaySummary, stamps_ns: Ints) -> tuple[Floats, str]:

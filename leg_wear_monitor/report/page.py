@@ -442,7 +442,7 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
     begin, end = summary.recording.begin_ns, summary.recording.end_ns
     if not begin <= stamp_ns <= end:
         return time_words(stamp_ns)
-    return f"{time_words(stamp_ns)}, {duration((stamp_ns - begin) / 1.0e9)} after the recording's begin"
+    return f"{time_words(stamp_ns)}, {duration((stamp_ns - begin) / 1.0e9)} after the start of the recording"
 
 
 def is_of_recording(summary: ReplaySummary) -> bool:
@@ -490,7 +490,7 @@ def verdict_banner(summary: ReplaySummary, guide: str, certainty: str) -> Banner
         notes.append(("Not valid", f"{figures}: {reason(verdict)}"))
     links = {"Do": ("step by step", guide)}
     if certainty and figures_of(summary):
-        links[HOW_SURE] = ("measured on what", certainty)
+        links[HOW_SURE] = ("test cases", certainty)
     return Banner(
         symbol=symbol,
         word=verdict.state.words.upper(),

@@ -211,7 +211,7 @@ def _replay(result: ReplaySummary | ReplayResult, axes: Axes | None = None) -> A
     if not is_valid:
         words = f"not valid: {Figure.CLEARANCES.words} ({summary.verdict.fault_code})"
         axes.set_title(words, fontsize=SMALL)
-    return _finished(axes, f"time since the recording's begin [{time_unit}]", f"opened by [{unit}]")
+    return _finished(axes, f"time since the start of the recording [{time_unit}]", f"opened by [{unit}]")
 
 
 @plot.register

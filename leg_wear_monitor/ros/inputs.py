@@ -185,7 +185,7 @@ def _named(names: Sequence[str]) -> str:
     """Names as printable text."""
     shown = ", ".join(printable(name, _MOST_LETTERS) for name in names[:_MOST_NAMES])
     if not names:
-        return "too many to name"
+        return "too many to list"
     return f"{shown} and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else shown
 
 
@@ -215,7 +215,7 @@ class InterfaceNames:
         if not self._without:
             return ""
         if len(self._without) > _MOST_BYTES:
-            return "too many joints to name"
+            return "too many joints to list"
         return without_interface(self._without, self._crank, self._interfaces)
 
 

@@ -171,7 +171,7 @@ def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:
             continue
         try:
             others = ", ".join(map(printable, sections_for_others(path, name)))
-            fault = f"{path}: nothing in it is used: its sections are for {others}, and this node is {name}"
+            fault = f"{path}: this file is not used: its sections are for {others}, and this node is {name}"
         except ConfigError as error:  # ROS has read it
             others, fault = "unknown", str(error)
         if others:

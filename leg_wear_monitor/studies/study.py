@@ -60,7 +60,7 @@ class Ensemble:
         "gait cycles of each run whose curves are stored", within=(1, _MOST), default=5
     )
     perturb_fraction: float = _count(
-        "journals start up to this fraction of the clearance from the centre",
+        "largest distance of a journal from the centre at the start, as a fraction of the clearance",
         within=(0.0, 1.0),
         default=0.3,
     )

@@ -109,5 +109,5 @@ def test_check_doubts_another_unit_and_says_what_it_understood(run, complaints, 
     line, *consequences = complaints(soft)
     assert line.startswith("warning: soft.yaml: clearances (")
     assert "youngs_modulus: 207 Pa" in line
-    assert line.endswith("GPa for Pa?")
+    assert line.endswith("Is it in GPa?")
     assert consequences and all("contact half angle" in each for each in consequences)

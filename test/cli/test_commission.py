@@ -19,7 +19,7 @@ def test_the_sample_recording_gives_files_that_check_accepts(run, tmp_path: Path
     line = ("--out", "monitor.yaml", "--reference", "leg.npz", "--json", "found.json")
     result = run("commission", str(HEALTHY), *line)
     assert result.exit_code == 1  # one cadence does not tell a lag from an offset
-    assert "not enough to tell: lag" in result.stdout
+    assert "not determined: lag" in result.stdout
     assert "drive_torque.sign" in result.stdout
     assert "written: leg.npz" in result.stdout
     config = load_config(tmp_path / "monitor.yaml")

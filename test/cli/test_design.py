@@ -22,7 +22,10 @@ def test_each_joint_is_shown_as_it_is_and_with_the_smallest_that_lasts(run, tmp_
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (("--duty", "300"), "error: --duty: '300' is not N:hours a day. Expected such as 0:2,300:5,600:1"),
+        (
+            ("--duty", "300"),
+            ("error: --duty: '300' is not N:hours per day. Expected for example 0:2,300:5,600:1"),
+        ),
         (("--widths-mm", "8,x"), "is not a list of numbers above 0, such as 8,10,12"),
         (("--materials", "cheese"), "cheese"),
         (("--limit-m", "5e-5"), "error: --limit-m: 5e-05 m is not between"),

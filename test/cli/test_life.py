@@ -49,7 +49,7 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped,
     (tmp_path / "rule.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
     rule = run("life", "--mechanism", "rule.yaml", *ONE[3:])
     assert rule.exit_code == 0
-    assert "B no modelled wear: its pair gives no wear coefficient" in rule.stdout
+    assert "B has no modelled wear, because its material pair has no wear coefficient" in rule.stdout
     assert "nan" not in rule.stdout
     (rating,) = [one for one in rule.stdout.splitlines() if one.startswith("B: the maker's rating life is ")]
     (tmp_path / "beside.yaml").write_text(
@@ -98,7 +98,7 @@ def test_the_table_of_a_life_has_its_first_and_its_last_point(points):
             "--max-wear-per-jump-m 1e-15",
             "--max-wear-per-jump-m: 1e-15 m per jump takes 4e+11 jumps to the limit. Expected at most 10000",
         ),
-        ("--duty 300", "--duty: '300' is not N:hours a day. Expected such as 0:2,300:5,600:1"),
+        ("--duty 300", "--duty: '300' is not N:hours per day. Expected for example 0:2,300:5,600:1"),
     ],
 )
 def test_a_life_that_would_not_end_is_refused_before_it_begins(run, monkeypatch, options, said):

@@ -68,8 +68,8 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
         ("crank_angle,load\n0.1,2\n", "foot_load: unknown column. The file has crank_angle, load"),
         (TABLE + "0.1,2,3\n0.2,two,3\n", "stance.csv: foot_load: row 2: 'two' is not a finite number"),
         (TABLE + "0.1,2\n", "stance.csv: foot_load_along: row 1: None is not a finite number"),
-        (TABLE + "0.1,2,3\n" * 20, "at least 12 rows of one gait cycle, in the order of their angles"),
-        (TABLE + "".join(f"{0.5 * i},2,3\n" for i in range(20)), "rows of one gait cycle"),
+        (TABLE + "0.1,2,3\n" * 20, "Expected 12 or more of one gait cycle"),
+        (TABLE + "".join(f"{0.5 * i},2,3\n" for i in range(20)), "of one gait cycle"),
         (
             TABLE + "".join(f"{0.017 * i},300,0\n" for i in range(36)),
             "stance.csv: crank_angle: no rows over 5.69 rad of the turn. Expected at most 0.57 rad",
@@ -78,7 +78,7 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
             TABLE + "".join(f"{0.5 * i},{-300 * (i % 2)},0\n" for i in range(13)),
             "stance.csv: foot_load: 0 N at most and -300 N at least. Expected a ground that pushes up",
         ),
-        ("", "expected at least 12 rows"),
+        ("", "Expected 12 or more"),
     ],
 )  # fmt: skip
 def test_a_load_that_is_no_gait_cycle_is_refused(run, tmp_path: Path, text: str, fault: str) -> None:
@@ -95,7 +95,7 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         read_toe_force(tmp_path / "stance.csv")
-    usual = f"foot_load: {shown} at most, usual are 10 to 5000 N; a unit other than N?"
+    usual = f"foot_load: {shown} at most, usually 10 to 5000 N. Is it in a different unit?"
     assert [str(each.message).split(": ", 1)[1] for each in found] == ([usual] if shown else [])
 
 

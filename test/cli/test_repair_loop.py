@@ -117,7 +117,7 @@ def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, g
 def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
     agrees = run("measure", "knee", "2.0", "--sigma", "0.05", "--ledger", ledger)
     assert agrees.exit_code == 1  # it is at its limit
-    assert "this agrees with what the drive torque shows, " in agrees.stdout
+    assert "this agrees with the drive torque: " in agrees.stdout
     assert "contradicts" not in agrees.stdout
 
 

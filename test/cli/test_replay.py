@@ -197,7 +197,7 @@ def test_without_a_believable_gait_cycle_there_are_no_forces(
 ):
     result = run("replay", str(write(tmp_path / "x.mcap", stamps, angle)), "--out", "out")
     assert result.exit_code == 1
-    assert f"warning: no gait cycle fits this leg, so no forces are given: {why}" in complaints(result)
+    assert f"warning: no gait cycle fits this leg, so no forces are reported: {why}" in complaints(result)
     assert "speed" not in result.stdout
     record = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert record["joints"] == {}

@@ -64,7 +64,7 @@ def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, ledger):
     assert result.stdout.splitlines() == [
         f"{reply}; --undo reverts it",
         "alarms cleared: impact_force G, clearance G; still present: clearance A",
-        "let the leg walk: the next gait cycles show whether the repair is good",
+        "let the leg walk: the next gait cycles confirm the repair",
     ]
     after, now = content(ledger)
     assert now == spans

@@ -73,7 +73,7 @@ def test_the_first_recording(learnt, capsys):
 def test_your_own_linkage(learnt, capsys):
     lesson, said = learnt("2_your_linkage"), capsys.readouterr().out
     assert "mobility 1, closes, and the crank turns through" in said
-    assert "bodies.coupler.mass: 800 kg, usual are 0.0001 to 300 kg; g for kg?" in said
+    assert "bodies.coupler.mass: 800 kg, usually 0.0001 to 300 kg. Is it in g?" in said
     for joint in lesson.loose.clearance_joints:
         ideal_n = lesson.ideal.joints[joint].max_force_n
         assert lesson.loose.joints[joint].contact_fraction > 0.95
@@ -125,7 +125,7 @@ def test_a_fleet(learnt, capsys):
     pytest.importorskip("mcap")
     pytest.importorskip("pandas")
     lesson, said = learnt("5_a_fleet"), capsys.readouterr().out
-    assert "recordings counted now: 2" in said and "recordings counted now: 0" in said
+    assert "recordings added now: 2" in said and "recordings added now: 0" in said
     assert "right-07: stop joint G" in said and "A: 0.31 mm ± 0.01 mm" in said
     assert lesson.legs.state.tolist() == ["stop", "healthy"]
     above = lesson.legs[lesson.legs.clearance_m > lesson.legs.limit_m]

@@ -130,7 +130,7 @@ def test_a_second_update_counts_nothing_and_changes_no_file(fleet, run) -> None:
 
     before = contents()
     done = run("fleet", "update", fleet[0], "--out", fleet[1], "--workers", 1, "--fresh-days", 3650)
-    assert (done.code, done.out.splitlines()[0]) == (0, "recordings counted now: 0")
+    assert (done.code, done.out.splitlines()[0]) == (0, "recordings added now: 0")
     assert contents() == before
 
 
@@ -197,9 +197,7 @@ def test_what_is_lost_beside_the_ledger_changes_no_wear(run, short, whole, tmp_p
     done = run("fleet", "update", home / "fleet.yaml", "--out", out, "--workers", 1)
     assert (done.code, ledgers(out)) == (0, before), done.lines
     assert [leg["counted"] for leg in overview(out)["legs"]] == [2, 2]
-    assert run("fleet", "update", home / "fleet.yaml", "--out", out).out.startswith(
-        "recordings counted now: 0"
-    )
+    assert run("fleet", "update", home / "fleet.yaml", "--out", out).out.startswith("recordings added now: 0")
 
 
 def test_a_new_recording_is_counted_a_copy_is_not_and_a_bad_leg_stops_no_other(
@@ -220,7 +218,7 @@ def test_a_new_recording_is_counted_a_copy_is_not_and_a_bad_leg_stops_no_other(
         "legs: [{id: a, recordings: 'a/*'}, {id: b, recordings: 'b/*'}, {id: c, recordings: 'c/*'}]\n"
     )
     done = run("fleet", "update", home / "fleet.yaml", "--out", home / "whole", "--workers", 2)
-    assert (done.code, done.out.splitlines()[0]) == (1, "recordings counted now: 1")
+    assert (done.code, done.out.splitlines()[0]) == (1, "recordings added now: 1")
     copy, trash, ledger = sorted(done.lines)
     assert "a: a/copy.csv: already counted" in copy
     assert "b: b/trash.mcap: unreadable; " in trash

@@ -100,7 +100,7 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("", "'' is not N:hours a day. Expected such as 0:2,300:5,600:1"),
+        ("", "'' is not N:hours per day. Expected for example 0:2,300:5,600:1"),
         ("300", "'300' is not N:hours a day"),
         ("0:2,300:x", "'300:x' is not N:hours a day"),
         ("0:2;300:5", "'0:2;300:5' is not N:hours a day"),
@@ -108,8 +108,8 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
         ("nan:2", "nan N is not a peak"),
         ("300:0", "0 h at 300 N is not a time above 0 h"),
         ("300:inf", "inf h at 300 N is not a time above 0 h"),
-        ("0:20,300:5", "25 h a day together are more than 24 h"),
-        ("300:2,300:5", "300 N is there twice"),
+        ("0:20,300:5", "25 h per day in total are more than 24 h"),
+        ("300:2,300:5", "300 N occurs twice"),
     ],
 )
 def test_a_duty_that_cannot_be_is_refused(text, fault):
@@ -119,7 +119,7 @@ def test_a_duty_that_cannot_be_is_refused(text, fault):
 
 
 def test_a_duty_has_a_load():
-    with pytest.raises(ConfigError, match=r"^duty: has no load. Expected such as 0:2,300:5,600:1"):
+    with pytest.raises(ConfigError, match=r"^duty: has no load"):
         lw.Duty({})
 
 

@@ -137,7 +137,7 @@ def test_a_start_near_another_assembly_is_named(document):
 def test_a_length_in_mm_is_named(document):
     wrong = document("four_bar")
     wrong["bodies"]["coupler"]["points"]["C"] = [200.0, 0.0]
-    assert "mm for m?" in findings(reach(wrong))[-1]
+    assert "Is it in mm?" in findings(reach(wrong))[-1]
 
 
 def test_the_loop_of_a_joint():

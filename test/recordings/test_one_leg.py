@@ -62,7 +62,7 @@ def test_messages_without_the_crank_among_others_are_a_finding(tmp_path, read):
     arm = write(tmp_path / "arm.mcap", names=("elbow", "wrist\x1b[2J"))
     both = tmp_path / "both.mcap"
     with pytest.raises(
-        RecordingError, match=r"of 400 messages, they have elbow, wrist\\x1b\[2J; set the crank"
+        RecordingError, match=r"of 400 messages; they have elbow, wrist\\x1b\[2J; set the crank"
     ):
         read(arm)
     stamps = START_NS + np.arange(400, dtype=np.int64) * 5_000_000
@@ -76,7 +76,7 @@ def test_messages_without_the_crank_among_others_are_a_finding(tmp_path, read):
     assert len(samples) == 800
     texts = [finding.text for finding in recording.findings if "crank" in finding.text]
     assert texts == [
-        "joint crank is not among the joints of 400 messages, they have elbow; 400 messages have it"
+        "joint crank is not among the joints of 400 messages; they have elbow; 400 messages have it"
     ]
     assert not recording.is_partial
 

@@ -155,7 +155,7 @@ def test_rows_without_a_time_come_at_their_rate(tmp_path, read):
     samples, recording = read(tmp_path / "a.csv", config=config)
     assert samples["stamp_ns"].tolist() == [10**9, 10**9 + 5 * 10**6]
     assert [finding.text for finding in recording.findings] == [
-        "drive_torque: is not a topic of the recording, it has /joint_states",
+        "drive_torque: is not a topic of the recording; it has /joint_states",
         "line 2 is lost: column '2': 'x' is not a number. Expected a value in rad",
     ]
 

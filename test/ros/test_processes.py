@@ -54,7 +54,7 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
         f"ledger {ledger} is begun",
         "of bionic_leg at 60 rpm, hardware leg",
         f"no topic of this node has the parameter {unused}; did you mean qos_overrides./joint_states",
-        f"{other}: nothing in it is used: its sections are for /monitor, and this node is /leg_wear_monitor",
+        f"{other}: this file is not used: its sections are for /monitor, and this node is /leg_wear_monitor",
     ):
         assert line in said
     assert all(b"Traceback" not in log.read_bytes() for log in logs.values())

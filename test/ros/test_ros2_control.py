@@ -112,7 +112,7 @@ def test_the_leg_on_ros2_control_is_healthy(stage: Any, stand_ins: Any) -> None:
     assert [line.name for message in alarms for line in message.status if line.level[0]] == []
     assert status["input"].values["torque_rate_hz"] == pytest.approx(200.0, rel=0.05)
     assert status["input"].values["foot_load_rate_hz"] == pytest.approx(200.0, rel=0.05)
-    assert status["torque"].message == "measured as predicted"
+    assert status["torque"].message == "the measured torque agrees with the prediction"
     # 25 °C at the start, and 60 °C after half an hour
     assert 25.0 < node.monitor.state.drive.temperature_c.value < 26.0
     assert status["diagnosis"].values["drive_temperature_c"] == pytest.approx(25.5, abs=0.5)

@@ -103,7 +103,7 @@ def _kernels() -> str:
     if place is not None and shipped_directory(place.name):
         return "compiled in the package"
     if place is None:
-        return "compiled at every start: no place for compiled code is private"
+        return "compiled at every start, because no directory for compiled code is private"
     common.check_directory("NUMBA_CACHE_DIR", place)
     return f"compiled once, in {place}"
 
@@ -213,7 +213,7 @@ def _drive(parameters: "DriveParameters", path: str) -> str:
         return ""
     known = [_FIGURES[name].format(value) for name, value in declared.items()]
     drive = f"\n{'':13} drive {parameters.type}".rstrip()
-    return f"{drive}, at the crank: {', '.join(known) or 'no figure is declared'}; the rest is estimated"
+    return f"{drive}, at the crank: {', '.join(known) or 'no value is declared'}; the rest is estimated"
 
 
 def _first_line(name: str) -> str:
@@ -240,10 +240,10 @@ def _mechanism(name: str) -> str:
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])
 
 
-# ``leg-wear-monitor drives``: drives by name, with the sources of their figures.
+# ``leg-wear-monitor drives``: drives by name, with the sources of their values.
 
 
-@click.command(short_help="List drives by name, with the sources of their figures.")
+@click.command(short_help="List drives by name, with the sources of their values.")
 @click.argument("name", required=False)
 @common.json_option("the drives")
 def drives(name: str | None, json_file: Path | None) -> None:
@@ -341,7 +341,7 @@ def _in_full(pair: "Material") -> list[str]:
 @click.option(
     "--fill", is_flag=True, help="Compile the kernels now instead of at the first start: about two minutes."
 )
-@click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
+@click.option("--clear", is_flag=True, help="Remove the compiled code; the next start compiles it again.")
 def cache(fill: bool, clear: bool) -> None:
     """Print the place and the size of the compiled code; or remove it, or compile it ahead.
 
@@ -353,7 +353,7 @@ def cache(fill: bool, clear: bool) -> None:
     from leg_wear_monitor.compiled.kernel import cache_directory
 
     if fill and clear:
-        raise click.UsageError("--fill and --clear: one at a time")
+        raise click.UsageError("--fill and --clear cannot be combined")
     here = cache_directory()
     if here is None:
         raise LegWearError("no directory is safe for compiled code, so it is not stored")

@@ -106,7 +106,7 @@ def _print(result: "CommissioningResult") -> None:
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n", table, sep="\n")
     console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
     texts = {
-        "not enough to tell": result.not_told,
+        "not determined": result.not_told,
         "does not fit": result.findings,
         "note": result.notes,
     }
@@ -114,7 +114,7 @@ def _print(result: "CommissioningResult") -> None:
         for sentence in sentences:
             console.print(f"{label}: {printable(sentence)}", soft_wrap=True)
     if result.config is None:
-        console.print("no parameters are proposed, because a choice between them is not certain")
+        console.print("no parameters are proposed, because a choice is not certain")
 
 
 def _shown(value: str | int | float | None) -> str:

@@ -12,12 +12,12 @@ from leg_wear_monitor.cli import common
 if TYPE_CHECKING:
     from leg_wear_monitor.fleet.overview import FleetOverview
 
-_OUT = "Directory of the fleet.  [default: out of the description, or fleet next to it]"
+_OUT = "Directory of the fleet.  [default: the key out of the fleet file, or fleet/ next to that file]"
 
 _fresh_option = common.option(
     "--fresh-days",
     "DAYS",
-    "Age of its last recording up to which a leg counts as monitored.",
+    "A leg is outdated if its last recording is older.",
     type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
     default=7.0,
 )
@@ -65,7 +65,7 @@ def update(
         )
     _write_pages(out, done.overview, fresh_days)
     common.print_findings([f"warning: {leg}: {text}" for leg, text in done.findings], f" in {out}/fleet.json")
-    click.echo(f"recordings counted now: {done.counted}")
+    click.echo(f"recordings added now: {done.counted}")
     states = [f"{number} {word.replace('_', ' ')}" for word, number in done.overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")
     for leg in done.overview.legs:

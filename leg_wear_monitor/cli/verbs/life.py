@@ -33,7 +33,8 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.option(
     "--duty",
     "N:H,...",
-    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1.  "
+    "Hours per day at each peak of the ground's vertical force on the "
+    "toe, as N:hours, such as 0:2,300:5,600:1.  "
     "[default: the mechanism's own loads]",
 )
 @common.option(
@@ -43,7 +44,7 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     type=common.POSITIVE,
 )
 @common.option("--legs", "N", "Number of legs averaged.  [default: 2]", type=click.IntRange(min=1))
-@common.option("--cycles", "N", "Gait cycles of each leg averaged.  [default: 4]", type=click.IntRange(min=2))
+@common.option("--cycles", "N", "Gait cycles averaged per leg.  [default: 4]", type=click.IntRange(min=2))
 @common.option(
     "--ensemble-size",
     "N",
@@ -136,7 +137,7 @@ def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list
     ends = result.end(limit_m)
     for joint in (*result.clearance_joints, *(["leg"] if result.duty else [])):
         if joint in validity and not validity[joint]["is_counted"]:
-            lines.append(f"{joint} no modelled wear: its pair gives no wear coefficient")
+            lines.append(f"{joint} has no modelled wear, because its material pair has no wear coefficient")
         else:
             lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
     for joint, known in validity.items():
@@ -151,7 +152,7 @@ def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list
 def _life_end(result: "Life", end: dict[str, float | None], limit_m: float) -> str:
     """When a joint, or the leg, reaches the limit."""
     if end["cycles"] is None:
-        return f"does not reach {1e6 * limit_m:g} µm: at its last rate, its clearance does not grow"
+        return f"does not reach {1e6 * limit_m:g} µm: its clearance does not grow at the last rate"
     days = f", {end['days']:.3g} days of {result.duty.hours_per_day:g} h" if result.duty else ""
     beyond = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated at its last rate"
     after = f"{end['cycles']:.3g} gait cycles, {end['hours']:.3g} h{days}"
@@ -172,13 +173,13 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     return found
 
 
-@click.command(short_help="Find bushings so that each joint lasts the wanted hours.")
+@click.command(short_help="Find bushings with which each joint lasts the wanted hours.")
 @click.argument("mechanism", default="bionic_leg")
 @common.clearances_option
 @common.option(
     "--duty",
     "N:H,...",
-    "Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5.",
+    "Hours per day at each peak of the ground's vertical force on the toe, as N:hours, such as 0:2,300:5.",
     default="0:8",
 )
 @common.option(
@@ -254,7 +255,7 @@ def design_lines(table: "Sequence[BushingLife]", hours: float) -> list[str]:
         lines.append(_design_line(f"{joint} now", now))
         lines += [_design_line(joint, row) for row in list(smallest.values())[:_PAIRS]]
         if not smallest:
-            lines.append(f"{joint:8}none of the bushings tried lasts {hours:g} h")
+            lines.append(f"{joint:8}no bushing that was tried lasts {hours:g} h")
     return lines
 
 

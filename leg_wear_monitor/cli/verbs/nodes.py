@@ -72,7 +72,7 @@ _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
 @common.option(
     "--out",
     "DIR",
-    "Directory of recording, report and logs.",
+    "Directory for recording, report and logs.",
     type=click.Path(path_type=Path),
     default="leg_wear_demo",
 )
@@ -255,16 +255,16 @@ def _compare_with_truth(out: Path, live: dict[str, Any]) -> None:
 _NODE = "/leg_wear_monitor"
 
 
-@click.command(short_help="Show a leg live in a browser, for reading only.")
+@click.command(short_help="Show a leg live in a browser, read-only.")
 @common.option(
     "--node", "NAME", "Full name of a running monitor, such as /left/leg_wear_monitor.", default=_NODE
 )
 @common.config_option
 @common.option(
-    "--host", "HOST", "Address to listen on; 0.0.0.0 for all of this machine.", default="127.0.0.1"
+    "--host", "HOST", "Address to listen on; 0.0.0.0 for all addresses of this machine.", default="127.0.0.1"
 )
 @common.option(
-    "--port", "PORT", "Port to listen on; 0 for any free one.", type=click.IntRange(0, 65535), default=8350
+    "--port", "PORT", "Port to listen on; 0 for any free port.", type=click.IntRange(0, 65535), default=8350
 )
 def dashboard(node: str, config: Path | None, host: str, port: int) -> int:
     """Serve a page with the verdict, the leg and the trends, renewed while you look, until Ctrl-C.

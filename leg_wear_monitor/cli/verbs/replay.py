@@ -41,13 +41,16 @@ TIMES = ("header", "log", "publish")
 @common.option(
     "--node",
     "NAME",
-    "Full name of the node to replace.  [default: leg_wear_monitor in the namespace of the crank's topic]",
+    "Full name of the node whose parameters apply.  [default: leg_wear_monitor "
+    "in the namespace of the crank's topic]",
 )
 @common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
 @common.file_option(
-    "--ledger", "FILE", "Ledger to continue or to begin; the one in the parameters is never touched."
+    "--ledger", "FILE", "Ledger to continue or to start. The ledger in the parameters is never changed."
 )
-@click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
+@click.option(
+    "--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording cannot be read."
+)
 @common.option(
     "--fail-on",
     "WHAT",
@@ -96,7 +99,7 @@ def replay(
     common.print_findings([finding.line for finding in result.findings])
     if result.is_unusable:
         missing = result.evidence.missing()
-        click.echo(f"warning: no gait cycle fits this leg, so no forces are given: {missing}", err=True)
+        click.echo(f"warning: no gait cycle fits this leg, so no forces are reported: {missing}", err=True)
     if json_file != common.STDOUT:
         from leg_wear_monitor.cli.tables import print_replay
 

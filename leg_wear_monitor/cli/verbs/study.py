@@ -30,12 +30,12 @@ NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "stud
     short_help="Run a parameter study.",
     help=f"""Compute a study and write its page.
 
-    STUDY is a YAML file, or one of {", ".join(NAMES)}. Points that DIR already has for the same leg, settings
-    and code are kept: the same command continues an interrupted study.
+    STUDY is a YAML file, or one of {", ".join(NAMES)}. Points in DIR for the same leg, settings
+    and code are kept, so the same command continues an interrupted study.
     """,
 )
 @click.argument("name", metavar="STUDY")
-@common.option("--mechanism", "FILE", "Use a different leg than the study file.")
+@common.option("--mechanism", "FILE", "Leg to use instead of the leg in the study file.")
 @common.path_option("--out", "DIR", "Data and page.", required=True)
 @common.workers_option
 @common.scheduler_option
@@ -173,14 +173,14 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=common.POSITIVE,
 )
 @common.speed_option
-@common.option("--cycles", "N", "Gait cycles to count.  [default: 5]", type=common.POSITIVE)
+@common.option("--cycles", "N", "Gait cycles in the results.  [default: 5]", type=common.POSITIVE)
 @common.option(
-    "--duration", "S", "Time [s] to count, in place of cycles.", "duration_s", type=common.POSITIVE
+    "--duration", "S", "Duration of the results [s], instead of --cycles.", "duration_s", type=common.POSITIVE
 )
 @common.option(
     "--skip-cycles",
     "N",
-    "Gait cycles before counting.  [default: 1; 0 with --duration]",
+    "Gait cycles skipped before the results.  [default: 1; 0 with --duration]",
     type=common.Number(min=0.0),
 )
 @click.option(
@@ -191,7 +191,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.Choice(("on", "off")),
     default="off",
     show_default=True,
-    help="Whether wear opens the clearances during the run; the results have the wear in both cases.",
+    help="on: the clearances grow by wear during the run. The results contain the wear in both cases.",
 )
 @common.option(
     "--normal-law",
@@ -216,7 +216,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 @common.option(
     "--intervals",
     "N",
-    "Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
+    "Model clearance: time intervals per gait cycle.  [default: 2048]",
     type=int,
 )
 @common.json_option("the result")

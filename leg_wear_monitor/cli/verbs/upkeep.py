@@ -37,7 +37,9 @@ def opened(
     elif node is not None:
         settings = settings.on_node(node)
     if not settings.ledger.path:
-        raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
+        raise ConfigError(
+            "--ledger", "", "no ledger is given. Expected --ledger FILE, or ledger.path in the parameters"
+        )
     leg = load_mechanism(settings.mechanism)
     if joint is not None:
         leg.clearance_joint(joint)  # refuses an unknown joint before a ledger is made
@@ -148,7 +150,7 @@ def reset(
             lines = [
                 f"new surfaces, {words} are set to 0, history kept; --undo reverts it",
                 f"alarms {alarm_words(*monitor.reset_wear(joint, now_ns, who))}",
-                "let the leg walk: the next gait cycles show whether the repair is good",
+                "let the leg walk: the next gait cycles confirm the repair",
             ]
     click.echo("\n".join([f"joint {joint}: {lines[0]}", *lines[1:]]))
     return 0
@@ -163,7 +165,7 @@ def reset(
 @common.option("--sigma", "MM", "Standard deviation of the measurement [mm].", type=common.POSITIVE)
 @common.config_option
 @common.ledger_option
-@click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
+@click.option("--accept", is_flag=True, help="Use the measurement even if it contradicts the model.")
 @common.node_option
 @common.wait_option
 @click.option(

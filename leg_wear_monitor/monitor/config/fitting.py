@@ -225,5 +225,5 @@ def _clearances(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
         ratio = 100.0 * c.radial_clearance / c.bushing_radius
         if not 1.0e-3 <= ratio <= 25.0:
             fraction = f"{c.radial_clearance:g} m is {ratio:.3g} % of the bushing's radius of joint {joint}"
-            yield Doubt("clearances_m", f"{fraction}; mm for m, or m for mm?")
+            yield Doubt("clearances_m", f"{fraction}. Is it in m?")
             return

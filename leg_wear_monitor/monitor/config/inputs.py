@@ -25,7 +25,7 @@ LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
 
 def _is_slow(rpm: float) -> str:
     cycle, meant = 60.0 / abs(rpm), rpm * 30.0 / math.pi
-    return f"{rpm:g} rpm is {cycle:.3g} s a gait cycle; rad/s for rpm? {rpm:g} rad/s is {meant:.4g} rpm"
+    return f"{rpm:g} rpm is {cycle:.3g} s a gait cycle. Is it in rad/s? {rpm:g} rad/s is {meant:.4g} rpm"
 
 
 def _turns(speed: float) -> str | None:
@@ -52,7 +52,7 @@ class Crank:
         "crank angle at joint position 0",
         within=(-100.0, 100.0),
         usual=(0.0, math.tau),
-        doubt="{value:g} rad is more than a turn; degrees for rad?",
+        doubt="{value:g} rad is more than a turn. Is it in degrees?",
         default=0.0,
     )
     gear_ratio: float = quantity(

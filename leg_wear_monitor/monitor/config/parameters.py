@@ -169,7 +169,7 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
     for name in changes:
         if parameters_of(type(config))[name].read_only and after[name] != values[name]:
             raise ConfigError(
-                source, name, f"{shown(changes[name])} cannot change now, it is read only at the start"
+                source, name, f"{shown(changes[name])} cannot change now: it is read only at the start"
             )
     return wanted
 
@@ -268,9 +268,9 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
             values |= _flat(parameters, "", source)
     if not taken:
         found = ", ".join(name for name, _ in sections)
-        fault = f"has nothing for the node {node}, its sections are for: {found}"
+        fault = f"has no section for the node {node}; its sections are for: {found}"
         if len(monitors_of(document)) > 1:
-            fault += "; choose one with --node, in a fleet file with node"
+            fault += "; choose one with --node (in a fleet file: node)"
         raise ConfigError(source, "", fault)
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
 

@@ -23,7 +23,7 @@ def _figure(
         f"{doc}; 0 takes the value of drive.type or {otherwise}",
         within=(0.0, most),
         usual=usual,
-        doubt=f"{USUAL}; {slip}?" if slip else USUAL,
+        doubt=f"{USUAL}. Is it in {slip}?" if slip else USUAL,
         default=0.0,
     )
     return number
@@ -38,17 +38,17 @@ class DriveParameters:
     )
     gear_ratio: float = quantity(
         "",
-        "turns of the drive's output per turn of the crank, for the figures of drive.type",
+        "turns of the drive's output per turn of the crank, for the values of drive.type",
         within=(1.0e-4, 1.0e4),
         default=1.0,
     )
-    lag_s: float = _figure("s", "delay of the measured torque", 1.0, (0.0, 0.1), "ms for s")
+    lag_s: float = _figure("s", "delay of the measured torque", 1.0, (0.0, 0.1), "ms")
     bandwidth_hz: float = _figure(
         "Hz",
         "corner frequency of the low-pass between crank torque and measured torque",
         1.0e5,
         (1.0, 2.0e4),
-        "kHz for Hz",
+        "kHz",
     )
     stiffness_nm_per_rad: float = _figure(
         "N m/rad",

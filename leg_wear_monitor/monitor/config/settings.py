@@ -36,7 +36,7 @@ class Limits:
         above=0.0,
         at_most=1.0e7,
         usual=(10.0, 1.0e7),
-        doubt="{value:g} N is less than a leg weighs; kN for N?",
+        doubt="{value:g} N is less than a leg weighs. Is it in kN?",
         default=10000.0,
     )
     clearance_m: float = live_quantity(

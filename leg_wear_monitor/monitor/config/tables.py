@@ -76,8 +76,8 @@ class Units:
     )
     crank_angle: str = choice(
         (*ANGLES, COUNTS),
-        "unit of the position, also of further encoders; counts: those of the encoder, "
-        "table.counts_per_turn a turn",
+        "unit of the position, also of further encoders; counts: encoder counts, "
+        "table.counts_per_turn per turn",
         default="rad",
     )
     crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
@@ -109,7 +109,7 @@ class TableInput:
     )
     rate_hz: float = quantity(
         "Hz",
-        "rows per second of a table without a column of the time; 0: there is table.columns.stamp",
+        "rows per second of a table without a time column; 0 if there is one",
         within=(0.0, 1.0e6),
         default=0.0,
     )

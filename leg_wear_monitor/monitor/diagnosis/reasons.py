@@ -76,7 +76,10 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         names = ", ".join(one.subject for one in state.changes)
         return f"the load at the foot has changed, and {names} may have opened meanwhile: measure it"
     if state.interim_changes:
-        return "the leg stays changed: clearances are not known, and a joint that opens from now on is named"
+        return (
+            "the leg has changed: its clearances are not known, but the monitor "
+            "names a joint that opens from now on"
+        )
     if models.is_sure(state):
         if state.fit is None or state.commissioned is None or state.changes:
             return ""
@@ -123,11 +126,11 @@ def _hidden(state: TorqueState, known: CommissionedTorque, joints: Sequence[str]
         return ""
     compared = next((one for one in state.all_commissioned if one.before is not None), None)
     if compared is None:
-        then = "the torque cannot tell, measure them"
+        then = "the torque cannot show it, so measure them"
     elif compared is known:
-        then = "a reference about it will show"
+        then = "a new reference will show it"
     else:
-        then = f"a reference about it will show at {60.0 * abs(compared.speed) / TURN:.3g} rpm"
+        then = f"a new reference will show it at {60.0 * abs(compared.speed) / TURN:.3g} rpm"
     return f"{names} may have opened with the joint that was corrected: {then}"
 
 

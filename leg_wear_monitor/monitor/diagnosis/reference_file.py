@@ -163,7 +163,7 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
             read = (_reference(parts, i, len(names), len(joints)) for i in references)
             found = tuple(one.in_order_of(mechanism, names) for one in read)
             if not found:
-                raise ValueError("there is none in it")
+                raise ValueError("it contains no reference")
             return found, name
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be read: {error.strerror or error}") from error

@@ -92,7 +92,7 @@ def life_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     lives = f"the lives of {given}" if given else "the lives of this leg that come with the package"
     text = (
         f"{lives} end at {1e3 * ends_m:.3g} mm, below the limit of joint {joint}, "
-        f"{1e3 * limits[joint]:g} mm; the forecast takes growth for constant beyond. Expected lives from "
+        f"{1e3 * limits[joint]:g} mm; beyond, the forecast assumes constant growth. Expected lives from "
         f"`leg-wear-monitor life --limit-m {limits[joint]:g}`"
     )
     return (Doubt("forecast.growth_law_file", text),)
@@ -164,7 +164,7 @@ def _life(record: dict[str, Any], clearance_joints: Sequence[str]) -> SimulatedL
     )
     shapes = {life.clearance_m.shape, life.growth_m_per_cycle.shape, (len(life.cycles), len(life.factor))}
     if len(shapes) > 1 or len(life.cycles) < 2 or not _can_be(life):
-        raise ValueError("figures that do not fit together")
+        raise ValueError("values that do not fit together")
     return life
 
 

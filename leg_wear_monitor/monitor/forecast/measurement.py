@@ -47,7 +47,6 @@ def validity(measurements: Sequence[Measurement]) -> str:
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
 
-AGREES = "this agrees with what"
 AT_LIMIT, CONTRADICTS_MODEL, NOT_STORED = "AT_LIMIT", "CONTRADICTS_MODEL", "NOT_STORED"
 """Codes that begin a service's reply in brackets if the operator has to act: ``[AT_LIMIT] A: …``."""
 
@@ -107,8 +106,8 @@ class MeasurementResult:
             return []
         now, shown = self.measurement, f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}"
         if self.agrees:
-            return [f"{AGREES} {self.shown_by} shows, {shown}"]
-        line = f"{self.shown_by} showed {shown}, and this measurement contradicts it"
+            return [f"this agrees with {self.shown_by}: {shown}"]
+        line = f"this contradicts {self.shown_by}: {shown}"
         if now.clearance_m + SURE_SIGMAS * now.sigma_m < self.limit_m <= self.shown_m:
             line += f": the alarm clearance {now.joint} is acknowledged with it"
         return [line]
@@ -119,7 +118,7 @@ class MeasurementResult:
         now, limit_m = self.measurement, self.limit_m
         size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
         lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
-        lines.append(f"the model has {_mm(self.modelled_m)} (limit {_mm(limit_m)}) and stays as it is")
+        lines.append(f"the modelled clearance stays at {_mm(self.modelled_m)} (limit {_mm(limit_m)})")
         if now.clearance_m >= limit_m:
             lines.append(
                 "the measured clearance is at its limit: stop the leg when it is safe; "
@@ -133,7 +132,7 @@ class MeasurementResult:
         lines += self._compared()
         if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
-            lines.append(f"the joint has opened otherwise than modelled; the forecast {used} the measurement")
+            lines.append(f"the joint has not opened as modelled; the forecast {used} the measurement")
             lines += self.words[-1:] if now.counts else []
             return (*lines, validity([*self.earlier, now]))
         return (*lines, *self.words, validity([*self.earlier, now]))
@@ -310,7 +309,7 @@ def _change(before: CoefficientEstimate, after: CoefficientEstimate, doubted_per
     if after.observations == before.observations:
         return "the estimate of the wear coefficient is unchanged"
     if after.sigma > _SAYS_SOMETHING * before.sigma:
-        return "it adds little: the wear is still too small for its accuracy"
+        return "the measurement adds little: the wear is still too small for its accuracy"
     low, middle, high = (float(x) for x in np.exp(after.log_factors((0.1, 0.5, 0.9))))
     line = (
         f"the wear coefficient is {middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90); "
@@ -319,7 +318,7 @@ def _change(before: CoefficientEstimate, after: CoefficientEstimate, doubted_per
     if middle * doubted_per_pa <= _MOST_PER_PA:
         return line
     return (
-        f"{line}; that is {middle * doubted_per_pa:.2g} 1/Pa, usual are below {_MOST_PER_PA:g} 1/Pa: the "
+        f"{line}; that is {middle * doubted_per_pa:.2g} 1/Pa, usually below {_MOST_PER_PA:g} 1/Pa: the "
         "joint has not opened by wear alone, and the forecast is far too short; withdraw the measurement "
         "and enter it without --accept"
     )

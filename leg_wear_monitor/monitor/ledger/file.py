@@ -189,9 +189,9 @@ def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None
     found = dict(db.execute("SELECT key, value FROM binding"))
     for key, ours in binding.as_texts().items():
         if found.get(key) != ours:
-            what = f"{path}: is of {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
+            what = f"{path}: belongs to {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
             if key == "hardware_id":
-                what += f"if it is this leg's, set {key}: {found.get(key)}, else "
+                what += f"if it is the ledger of this leg, set {key}: {found.get(key)}, otherwise "
             raise LedgerError(
                 what
                 + "set ledger.path to a different file for this leg, or the parameters back to the former leg"

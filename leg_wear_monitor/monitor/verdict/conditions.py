@@ -414,7 +414,7 @@ def other_cadence(situation: Situation) -> Sequence[Hit]:
     notes, alarms = situation.notes.get("CADENCE", ()), raised("cadence")(situation)
     if not notes and not alarms:
         return []
-    cause = notes[0] if notes else "it walked at a different one for several gait cycles"
+    cause = notes[0] if notes else "for several gait cycles, the leg walked at a different cadence"
     since_ns, evidence = (alarms[0].since_ns, alarms[0].evidence) if alarms else (0, ())
     return [Hit(words={"cause": cause}, since_ns=since_ns, evidence=evidence)]
 

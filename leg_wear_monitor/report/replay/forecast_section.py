@@ -138,7 +138,7 @@ def _deepest(summary: ReplaySummary) -> str:
     depths = {name: _greatest(worn) for name, worn in summary.wear_depth_m.items()}
     name = max(depths, key=lambda joint: depths[joint], default="")
     if not name or not depths[name]:
-        return "No wear is counted."
+        return "No wear is modelled."
     factor, unit = length_unit(depths[name])
     limit = summary.clearances[name].limit_m if name in summary.clearances else None
     beside = f", {100.0 * depths[name] / limit:.2g} % of the limit of its clearance" if limit else ""

@@ -361,7 +361,7 @@ def _joints(summary: ReplaySummary) -> Section:
 def _gait_sentences(gait: ReplayGait) -> list[str]:
     """Reason why there are no forces, if there are none."""
     if gait.is_counted:
-        return ["All of it is in the ledger already, so no gait cycle was processed again."]
+        return ["The ledger already contains this recording, so no gait cycle was processed again."]
     if gait.believable_cycles:
         return []
     missing = [f"Missing: {gait.missing}."] if gait.missing else []

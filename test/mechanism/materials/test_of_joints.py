@@ -106,11 +106,13 @@ def test_the_joints_by_what_their_wear_holds_for() -> None:
     mixed = leg(A={}, B={}, G={"material": "du-on-steel-dry"}, I=beside)
     assert regimes(mixed, mixed.clearance_joints) == {
         "steel-on-steel-greased-mild (greased, mild), wear coefficient 1e-15 1/Pa": ["A", "B"],
-        "du-on-steel-dry (dry), wear coefficient not known: not counted": ["G"],
+        "du-on-steel-dry (dry), wear coefficient not known: no wear is modelled": ["G"],
         "a value beside du-on-steel-dry (dry), wear coefficient 1e-16 and 0 1/Pa": ["I"],
     }
     bare = lw.load_mechanism("four_bar")
-    assert list(regimes(bare, ["B"])) == ["no material named, regime unknown, wear coefficient 1e-15 1/Pa"]
+    assert list(regimes(bare, ["B"])) == [
+        ("no material is named, so the regime is not known, wear coefficient 1e-15 1/Pa")
+    ]
 
 
 def test_a_coefficient_beside_limits_is_enough() -> None:

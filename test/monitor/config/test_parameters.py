@@ -238,9 +238,9 @@ def test_a_file_of_one_node_is_read_for_that_node_and_one_of_two_needs_to_know_w
     assert parse_config(dump, "dump.yaml").hardware == "L"
     both = dump | {right: {"ros__parameters": {"hardware_id": "R"}}}
     assert parse_config(both, "both.yaml", right).hardware == "R"
-    with pytest.raises(ConfigError, match="has nothing for the node /leg_wear_monitor"):
+    with pytest.raises(ConfigError, match="has no section for the node /leg_wear_monitor"):
         parse_config(both, "both.yaml")
-    with pytest.raises(ConfigError, match="has nothing for the node /leg_wear_monitor"):
+    with pytest.raises(ConfigError, match="has no section for the node /leg_wear_monitor"):
         parse_config({"/camera": {"ros__parameters": {}}}, "camera.yaml")
 
 

@@ -91,8 +91,8 @@ UNTOLD = {
     "few": (lambda one: np.delete(one, np.flatnonzero(one["kind"] != CRANK)[::10].repeat(9) + 2 * np.tile(
         np.arange(1, 10), len(one) // 20)), 60.0, "samples in 4 turns. Expected 25 a turn"),
     "standing": (standing, 60.0, "the leg stands"),
-    "another cadence": (lambda one: one, 80.0, "at 60 rpm, the commanded cadence is 80 ± 6 rpm"),
-    "backwards": (lambda one: one, -60.0, "the leg walks at 60 rpm, the commanded cadence is -60 ± 6 rpm"),
+    "another cadence": (lambda one: one, 80.0, "at 60 rpm; the commanded cadence is 80 ± 6 rpm"),
+    "backwards": (lambda one: one, -60.0, "the leg walks at 60 rpm; the commanded cadence is -60 ± 6 rpm"),
 }  # fmt: skip
 
 

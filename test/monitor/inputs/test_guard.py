@@ -62,7 +62,7 @@ def test_two_sources_that_disagree_are_named_and_not_counted(monitor, gait, name
     assert "input_sources" in raised(monitor)
     status = status_of(monitor, "input")
     assert status.level is Level.ERROR
-    assert status.message.startswith("two series of crank angles interleave")
+    assert status.message.startswith("two sources of the crank angle disagree")
     assert status_of(monitor, "gait").level is Level.ERROR
     assert monitor.lost.conflicting > 0.5 * len(second)
     totals = status_of(monitor, "gait").values

@@ -201,7 +201,7 @@ CASES = [
     (raised("input_samples", present=Level.OK), State.WATCH, "ALARM", ()),
     (raised("input_rate torque"), State.WATCH, "ALARM", ()),
     (
-        noted("CRANK_ZERO", "the crank's zero is being found: 2 of 3 turns"),
+        noted("CRANK_ZERO", "searching for the crank's zero: 2 of 3 turns"),
         State.NOT_MONITORED,
         "CRANK_ZERO",
         OF_THE_WALK,
@@ -388,10 +388,10 @@ def test_several_joints_stand_together_with_their_clearances() -> None:
 
 
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
-    fault = "the crank has not been followed for 4 s"
+    fault = "the crank has not been tracked for 4 s"
     verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), notes={"TRACKING_LOST": (fault,)})
     assert verdict.state is State.STOP
-    assert verdict.why.endswith("the leg is not monitored now: the crank has not been followed for 4 s")
+    assert verdict.why.endswith("the leg is not monitored now: the crank has not been tracked for 4 s")
     assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
 
 

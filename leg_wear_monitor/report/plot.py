@@ -177,7 +177,7 @@ def _wear(result: SimulationResult, name: str, axes: Axes) -> Axes:
         axes.tick_params(labelsize=SMALL)
         axes.yaxis.set_major_locator(MaxNLocator(3))
         axes.set_rlabel_position(135.0)
-        axes.legend(fontsize=SMALL, frameon=False, loc="lower left", bbox_to_anchor=(0.9, 0.85))
+        axes.legend(fontsize=SMALL, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2)
         return axes
     return _finished(axes, "angle in the body's frame [°]", f"wear depth [{unit}]")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.cli.main import cli
@@ -64,14 +65,19 @@ def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(tmp_path, monkeyp
     )
 
 
-def test_the_cells_of_examples_notebook_run():
-    pytest.importorskip("mcap")
-    notebook = json.loads((EXAMPLES / "notebook" / "verdict.ipynb").read_text())
+def run_cells(path):
+    """Run the cells of code of a notebook, which has no outputs, as a notebook does; its names at the end."""
     names = {}
-    for cell in notebook["cells"]:
+    for cell in json.loads(path.read_text())["cells"]:
         if cell["cell_type"] == "code":
             assert cell["outputs"] == [] and cell["execution_count"] is None
-            exec("".join(cell["source"]), names)  # as a notebook does
+            exec("".join(cell["source"]), names)
+    return names
+
+
+def test_the_cells_of_examples_notebook_run():
+    pytest.importorskip("mcap")
+    names = run_cells(EXAMPLES / "notebook" / "verdict.ipynb")
     assert names["summary"].verdict.joints == ("G",) and names["seen"]["G"] > 0.6
     assert names["axes"].get_ylabel().startswith("opened by")
 
@@ -82,12 +88,18 @@ def test_the_linkage_of_examples_own_linkage_walks(monkeypatch, capsys):
     assert ideal.startswith("clearance in none: ") and loose.startswith("clearance in B, C: ")
 
 
-def test_the_figures_of_examples_paper_are_drawn(monkeypatch, tmp_path):
-    pytest.importorskip("matplotlib")
+def test_the_cells_of_examples_paper_draw_every_figure(monkeypatch, tmp_path):
+    for module in ("matplotlib", "pandas"):
+        pytest.importorskip(module)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("matplotlib.pyplot.show", lambda: pyplot.close("all"))
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda _figure, path: Path(path).touch())
     monkeypatch.setattr(lw, "simulate", shortened(lw.simulate))
-    run_script(EXAMPLES / "paper" / "figures.py", monkeypatch, str(tmp_path), "2")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["all.pdf", "foot.pdf", "hip.pdf", "knee.pdf"]
+    names = run_cells(EXAMPLES / "paper" / "paper.ipynb")
+    kinds = ["displacement", "velocity", "acceleration", "torque", "force", "wear", "portrait", "poincare"]
+    drawn = {f"{place}_{kind}.pdf" for place in ("hip", "knee", "foot", "all") for kind in kinds}
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == drawn
+    assert list(names["table"].index) == ["A", "B", "G", "I", "J"]
 
 
 def shortened(simulate):

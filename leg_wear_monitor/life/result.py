@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# Duty of a leg: hours a day that it walks under each load of the ground.
+# Duty of a leg: hours per day that it walks under each load of the ground.
 
 
 _MOST_N = 10_000.0  # of a peak: ten times a person's weight
@@ -72,7 +72,7 @@ class Duty:
 
     @classmethod
     def parse(cls, text: str) -> "Duty":
-        """Duty of a text such as ``0:2,300:5,600:1``: peak [N] and hours a day of each part.
+        """Duty of a text such as ``0:2,300:5,600:1``: peak [N] and hours per day of each part.
 
         Raises
         ------

@@ -101,9 +101,9 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
     ("text", "fault"),
     [
         ("", "'' is not N:hours per day. Expected for example 0:2,300:5,600:1"),
-        ("300", "'300' is not N:hours a day"),
-        ("0:2,300:x", "'300:x' is not N:hours a day"),
-        ("0:2;300:5", "'0:2;300:5' is not N:hours a day"),
+        ("300", "'300' is not N:hours per day"),
+        ("0:2,300:x", "'300:x' is not N:hours per day"),
+        ("0:2;300:5", "'0:2;300:5' is not N:hours per day"),
         ("-5:2", "-5 N is not a peak from 0 to 10000 N"),
         ("nan:2", "nan N is not a peak"),
         ("300:0", "0 h at 300 N is not a time above 0 h"),

@@ -60,7 +60,7 @@ FILES = [
     ("limits: {clearance_m: 0.001}", ["is not a ROS parameter file"]),
     ("/**: {ros__parameters: 7}", ["/**.ros__parameters", "7", "mapping"]),
     ("/**: {ros__parameters: {}, limits: {}}", ["/**", "one key ros__parameters"]),
-    ("/gait_publisher: {ros__parameters: {}}", ["nothing for the node /leg_wear_monitor", "/gait_publisher"]),
+    ("/gait_publisher: {ros__parameters: {}}", ["no section for the node", "/gait_publisher"]),
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
     (
         f"/**: {{ros__parameters: {{limits.clearance_m: 1{400 * '0'}}}}}",

@@ -10,7 +10,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm, amount
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
@@ -76,20 +76,11 @@ class AlarmLog:
 
 def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
     """Log line for an alarm's change of level: name, levels, value, limit, time."""
-    unit = f" {alarm.unit}" if alarm.unit else ""
-    verb = "rises" if alarm.present > before else "falls"
+    limit = "" if math.isnan(alarm.limit) else f", limit {amount(alarm.limit, alarm.unit)}"
+    value = f"{amount(alarm.value, alarm.unit)}{limit}"
+    time = f" at {health.utc(stamp_ns)}" if stamp_ns > 0 else ""
     latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
-    value = "unknown" if math.isnan(alarm.value) else f"{_plain(alarm.value)}{unit}"
-    limit = "" if math.isnan(alarm.limit) else f", limit {_plain(alarm.limit)}{unit}"
-    time = f", at {health.utc(stamp_ns)}" if stamp_ns > 0 else ""
-    return (
-        f"alarm {alarm.name} {verb} from {before.name} to {alarm.present.name}: {value}{limit}{time}{latched}"
-    )
-
-
-def _plain(value: float) -> str:
-    """Four digits, as 11640 and not as 1.164e+04."""
-    return f"{float(f'{value:.4g}'):g}"
+    return f"alarm {alarm.name}: {before.name} -> {alarm.present.name} ({value}){time}{latched}"
 
 
 class StatusLog:

@@ -49,7 +49,7 @@ POSITIVE = Number(min=0.0, min_open=True)
 
 @contextmanager
 def options_named() -> Iterator[None]:
-    """Name an option as it is written on the command line, where the library names its parameter."""
+    """Replace the parameter name of the library in an error by the option on the command line."""
     options = {name for option in click.get_current_context().command.params for name in option.opts}
     try:
         yield
@@ -304,12 +304,12 @@ def print_findings(lines: Sequence[str], rest: str = "") -> None:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file such that no one ever sees a part of it; a device or a pipe just gets the bytes.
+    """Write a whole file at once; a device or a pipe gets the bytes directly.
 
     Raises
     ------
     ConfigError
-        When the disk does not take it.
+        If the disk cannot store it.
     """
     if _is_stream(path):
         path.write_bytes(content)

@@ -82,7 +82,7 @@ def _print_error(text: str) -> None:
 
 @contextmanager
 def _warnings_as_lines() -> Iterator[None]:
-    """Print a ConfigWarning as one line; others as Python does."""
+    """Print a ConfigWarning as one line, and other warnings in Python's format."""
     usual = warnings.showwarning
 
     def show(

@@ -20,7 +20,7 @@ _SURE_LOAD = 5.0  # standard deviations
 
 
 def with_load(one: Fit, model: TorqueModel, terms: Terms) -> tuple[Fit, Terms]:
-    """The fit with a foot load, if that explains most of the rest that repeats; else the fit as it is."""
+    """The fit with a foot load if this explains most of the repeating residual; otherwise without."""
     before = repeating(one) ** 2
     if not model.load.any() or before < _LEAST_LOAD**2:
         return one, terms

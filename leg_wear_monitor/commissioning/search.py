@@ -163,7 +163,7 @@ def _refined(pair: Pair, steady: Pair, model: TorqueModel, start: Start) -> Fit:
 
 
 def on_one_shaft(one: Fit, other: Fit) -> bool:
-    """Whether two joints turn in a fixed ratio: the crank angles from them differ by a constant."""
+    """True if two joints turn in a fixed ratio, so that their crank angles differ by a constant."""
     angle, there = one.crank()[0], other.crank()[0]
     time_s, times = one.pair.time_s, other.pair.time_s
     both = (time_s >= times[0]) & (time_s <= times[-1])

@@ -1,4 +1,4 @@
-"""Settings: YAML within bounds, strict conversion with one clear line an error; keys declared once.
+"""Settings: YAML within bounds, strict conversion with one clear line per error. Each key is declared once.
 
 The modules imported here import neither numpy nor numba.
 """

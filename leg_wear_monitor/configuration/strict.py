@@ -105,7 +105,7 @@ def shown(value: Any) -> str:
 
 
 def _part(step: str, value: Any, kind: Any) -> Any:
-    """Structure a part of a file; faults in it are reported under its name."""
+    """Convert a part of a file; errors name this part."""
     try:
         return _converter.structure(value, kind)
     except _FAULTS as error:
@@ -388,7 +388,7 @@ class Library:
     ----------
     folder : str
     what : str
-        Name for one such file, in a word, for messages.
+        Word for such a file in messages.
     kind : type
         Class of the structured file.
     """

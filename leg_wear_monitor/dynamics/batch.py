@@ -131,7 +131,7 @@ def advance_batch(
     Parameters
     ----------
     steppers : sequence of n ClearanceStepper
-        Each of its own setup: steppers of one setup would wear the same surfaces.
+        Each with its own setup, because steppers of one setup share their surfaces.
     polynomials : sequence of n arrays (7,)
         Motions of the cranks, as in `ClearanceStepper.advance`.
     t_end : float or (n,) array, s

@@ -121,7 +121,7 @@ def check_kinds(**values: object) -> None:
 
 
 _POINTS = 1440
-_MOST_WHOLE = 100  # whole cycles up to which a partial cycle is counted; beyond, it hardly matters
+_MOST_WHOLE = 100  # whole cycles up to which a partial cycle is included; beyond, its effect is negligible
 
 
 def ideal_result(setup: Setup, cycles: float, trace: int, begin: float = 0.0) -> SimulationResult:

@@ -84,9 +84,9 @@ def energy_balance(statistics: RunStatistics, stored_before: float, stored_after
 # Residual over the losses, and over its standard error, above which the energy does not close: five clearance
 # joints of the default leg have 0.3 % at 0.6 mm, 1.3 % at 2 mm and 6 % at 3 mm, with wear off.
 _MOST_RESIDUAL, _SURE = 0.02, 3.0
-# losses that count at least, over the work to and fro, the drive's RMS torque times its way: with hardly any
-# losses, as at 0.6 rpm or with elastic contacts without friction, residuals of up to 9e-5 of it are beyond
-# them, and forces right; at 3 mm it is 9e-4
+# smallest losses, as a fraction of RMS torque times crank travel. Runs with hardly any losses (0.6 rpm, or
+# elastic contacts without friction) have residuals of up to 9e-5 of it and correct forces; at 3 mm the
+# residual is 9e-4
 _LEAST_LOSS = 0.005
 
 

@@ -135,7 +135,7 @@ class Terms:
 
 @attrs.frozen(eq=False)
 class State:
-    """Parameters under way.
+    """Parameters during the iteration.
 
     Attributes
     ----------

@@ -287,7 +287,7 @@ def _check_names(legs: Iterable[LegEntry], source: str) -> None:
 
 
 def _check_recordings(legs: Iterable[FleetLeg], source: str) -> None:
-    """Refuse a recording that two legs share, unless each leg has a topic of its own in it."""
+    """Refuse a recording of two legs, unless each leg names its own topic in it."""
     owners: dict[Path, list[FleetLeg]] = {}
     for leg in legs:
         for path in leg.recordings:

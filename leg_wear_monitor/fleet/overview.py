@@ -90,7 +90,7 @@ class LegOverview:
 
     @property
     def worst_joint(self) -> str:
-        """The joint that has used up the largest part of its clearance limit; empty if none is known."""
+        """The joint whose clearance is the largest fraction of its limit; empty if none is known."""
         used = self.used_fraction
         return max(used, key=lambda joint: used[joint], default="")
 

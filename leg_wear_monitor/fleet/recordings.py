@@ -76,7 +76,7 @@ class ReadRecording:
 
     @property
     def fault(self) -> str:
-        """One line if the operator must know of it; empty otherwise."""
+        """One line for the operator if the recording has a fault; empty otherwise."""
         if self.is_counted and not self.is_partial:
             return ""
         words = "added in part" if self.is_counted else self.outcome.replace("_", " ")

@@ -36,7 +36,7 @@ class JumpControl:
 
     @classmethod
     def of(cls, max_wear_per_jump_m: float) -> "JumpControl":
-        """Control with a deepest change per jump [m] and an error tolerance of 10 % of it."""
+        """Limits of a jump from its deepest change [m]; the error tolerance is 10 % of this change."""
         return cls(max_wear_per_jump_m=max_wear_per_jump_m, tolerance_m=_TOLERATED * max_wear_per_jump_m)
 
 

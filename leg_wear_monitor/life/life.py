@@ -89,7 +89,7 @@ def check_life(
         )
 
 
-_TRIALS = 4  # of a jump with too large an error, before it is accepted and reported
+_TRIALS = 4  # attempts to halve a jump before its error is accepted and reported
 
 
 @attrs.frozen(kw_only=True)

@@ -216,7 +216,7 @@ def _of_pair(given: dict[str, Any], source: str, place: str) -> dict[str, Any]:
 
 
 def _over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """Settings with others over them, key by key, also inside ``friction``."""
+    """Merge two sets of settings key by key, also inside ``friction``; the second set takes precedence."""
     merged = below | above
     if isinstance(below.get("friction"), dict) and isinstance(above.get("friction"), dict):
         merged["friction"] = below["friction"] | above["friction"]

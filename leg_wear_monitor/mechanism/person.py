@@ -24,7 +24,7 @@ from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, 
 # centre of mass, are relative to the length of the segment.
 
 
-PERSON_TOLERANCE = 0.2  # fraction of a person's mass: food, clothes, loads
+PERSON_TOLERANCE = 0.2  # tolerance of a person's mass as a fraction, for food, clothes and loads
 
 
 class _Segment(NamedTuple):

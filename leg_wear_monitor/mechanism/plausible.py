@@ -72,7 +72,7 @@ def _lengths(mechanism: spec.Mechanism) -> Iterator[Doubt]:
 def _angles(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     angles = {"crank_angle": mechanism.assembly.crank_angle}
     angles |= {body: pose[2] for body, pose in mechanism.assembly.poses.items()}
-    name = max(angles, key=lambda each: abs(angles[each]))  # where one is in degrees, all are
+    name = max(angles, key=lambda each: abs(angles[each]))  # if one angle is in degrees, all angles are
     if _beyond(angles[name], 0.0, TURN):
         turns = angles[name] / TURN
         yield Doubt(f"assembly.{name}", f"{angles[name]:g} rad is {turns:.3g} turns. Is it in degrees?")

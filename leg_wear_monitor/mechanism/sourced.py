@@ -175,14 +175,14 @@ def sourced(dimension: str, doc: str) -> Any:
     )
 
 
-# Type of a drive file: a motor with its gear and controller, as it is sold.
+# Type of a drive file: a commercial motor with its gear and controller.
 
 
 SHAFTS = OUTPUT, MOTOR = ("output", "motor")
 
 
 class SourcedFile:
-    """Content of a file of figures with their sources."""
+    """Content of a file of values with their sources."""
 
     def values(self) -> Iterator[tuple[str, SourcedValue]]:
         """Every number with its dotted key."""
@@ -243,7 +243,7 @@ class Drive(SourcedFile):
 
     @property
     def motor_turns(self) -> float:
-        """Turns of the figures' shaft per turn of the drive's output."""
+        """Turns of the shaft to which the values refer, per turn of the drive's output."""
         return self.gear_ratio.si if self.shaft == MOTOR and self.gear_ratio is not None else 1.0
 
 

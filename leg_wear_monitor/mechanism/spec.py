@@ -150,7 +150,7 @@ class Body:
 
 
 _LONGEST_LABEL = 30
-_IN_LABELS = " ',-./+"  # with letters and digits: nothing that a page or a terminal takes for markup
+_IN_LABELS = " ',-./+"  # allowed in addition to letters and digits: no character of markup
 
 
 def _label_fault(label: str) -> str | None:

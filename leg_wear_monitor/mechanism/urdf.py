@@ -23,7 +23,7 @@ from leg_wear_monitor.mechanism.position import (
 )
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, Vector
 
-_RADIUS = 0.03  # of the cylinders, as a fraction of the longest distance between points of a body
+_RADIUS = 0.03  # radius of the cylinders as a fraction of the longest distance between points of a body
 
 
 @attrs.frozen
@@ -42,7 +42,7 @@ class Branch:
 
 
 def tree(mechanism: Mechanism) -> tuple[Branch, ...]:
-    """Joints that carry each body, from the ground on; the joints that are not in it close the loops."""
+    """Joint that carries each body, starting at the ground; all other joints close the loops."""
     found: list[Branch] = []
     reached = [GROUND]
     for parent in reached:  # grows meanwhile: the nearest to the ground come first

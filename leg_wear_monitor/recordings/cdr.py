@@ -76,7 +76,7 @@ def float64(data, at, big):
 
 @kernel
 def aligned(at, size, origin):
-    """Next position that is a multiple of a size, seen from the start of the body."""
+    """Next position whose distance from the start of the body is a multiple of a size."""
     return at + (origin - at) % size
 
 
@@ -127,7 +127,7 @@ def header(data, origin, end, big):
 
 @kernel
 def names(data, at, end, origin, big, wanted):
-    """Length of a sequence of texts, where in it the wanted one is (-1: not once), the position behind it."""
+    """Number of texts, index of the wanted text (-1 unless it occurs once), position after them."""
     count, at = counted(data, at, end, origin, big)
     if at < 0 or count > (end - at) // 4:
         return np.int64(0), np.int64(-1), np.int64(-1)
@@ -186,7 +186,7 @@ def joint_state(data, begin, end, big, crank):
 
 @kernel
 def joint_angle(data, begin, end, big, wanted):
-    """Position of a joint in a sound sensor_msgs/JointState: NaN if it is not in it, infinite if no angle."""
+    """Position of a joint in a valid JointState: NaN if the joint is missing, infinite without an angle."""
     origin = begin + ENCAPSULATION
     _, at = header(data, origin, end, big)
     _, index, at = names(data, at, end, origin, big, wanted)

@@ -27,7 +27,7 @@ _PERIOD_NS = 100_000_000
 _NEVER_NS = 2**63 - 1
 _STEPS = 180  # positions per turn; the nearest one is drawn
 
-# Okabe and Ito's colours, which colour-blind people can tell apart; the levels are in the text as well
+# Okabe and Ito's colours, because colour-blind people can distinguish them; the text has the levels as well
 _COLOURS = {Level.OK: (0.0, 0.45, 0.70), Level.WARN: (0.90, 0.62, 0.0), Level.ERROR: (0.84, 0.37, 0.0)}
 _SIZES = {Level.OK: 0.03, Level.WARN: 0.042, Level.ERROR: 0.054}
 _GREY, _BODIES, _TEXTS = (0.55, 0.55, 0.55), (0.60, 0.62, 0.68), (0.90, 0.90, 0.90)
@@ -148,7 +148,7 @@ class LegMarkers:
         return self._drawn(stamp_ns)
 
     def set_state(self, alarms: AlarmList, verdict: VerdictReport) -> None:
-        """Set alarms and verdict at once, because an operator has changed them."""
+        """Set alarms and verdict immediately after an action of an operator."""
         self._now = attrs.evolve(self._now, levels=self._levels(alarms), verdict=_words(verdict))
 
     def _at(self, samples: SampleReports, i: int) -> Iterator[Outgoing]:

@@ -146,14 +146,14 @@ class History:
 
 
 def joint_forecast(forecast: JointForecast | None, verdict: Verdict) -> JointForecast | None:
-    """A joint's forecast; without life and clearance if the verdict does not believe them."""
+    """A joint's forecast; without life and clearance if the verdict marks them as not valid."""
     if forecast is None or Figure.FORECAST not in verdict.not_valid:
         return forecast
     return attrs.evolve(forecast, cycles=None, hours=None, days=None, clearance_m=None)
 
 
 def leg_forecast(forecast: LegForecast | None, verdict: Verdict) -> LegForecast | None:
-    """The leg's forecast; without its remaining life if the verdict does not believe that."""
+    """The leg's forecast; without its remaining life if the verdict marks it as not valid."""
     if forecast is None or Figure.FORECAST not in verdict.not_valid:
         return forecast
     return attrs.evolve(forecast, cycles=None, hours=None, days=None, first_probability={}, first=None)

@@ -60,7 +60,7 @@ _KEYS = {CRANK: CRANK_ANGLE, TORQUE: DRIVE_TORQUE, LOAD: FOOT_LOAD}
 """Column whose values are samples, by the kind of the samples."""
 _MOST_NS = (2**31 - 1) * 1_000_000_000  # the seconds of a ROS stamp are an int32: until 2038
 _ROWS, _BLOCK_BYTES = 65536, 2**21
-_MOST_LOST = 5  # findings about lost rows of a table; the rest is counted
+_MOST_LOST = 5  # largest number of findings about lost rows; further rows are only counted
 
 _Bools = NDArray[np.bool_]
 _Ints = NDArray[np.int64]

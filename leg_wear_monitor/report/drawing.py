@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, S
 from leg_wear_monitor.report.leg_slider import leg_slider
 from leg_wear_monitor.report.page import Page, Section, Sentences, Table, page_html
 
-CREATOR = "leg-wear-monitor draw"  # in the head of every drawing: the command replaces no other file
+CREATOR = "leg-wear-monitor draw"  # mark of every drawing; only such files are overwritten
 
 
 def first_position(reach: Reach) -> int:

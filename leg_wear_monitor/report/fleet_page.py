@@ -46,7 +46,7 @@ def fleet_page(
 
 
 def _doubt(leg: LegOverview, now_ns: int, fresh_days: float) -> str:
-    """Why the verdict of a leg does not tell its state today; empty if it does."""
+    """Reason why the verdict of a leg is outdated; empty if it is current."""
     if leg.state is None:
         return "the ledger has no recording of it"
     age_days = (now_ns - leg.last_ns) / DAY_NS

@@ -424,7 +424,7 @@ NOT_VALID = "not valid"
 
 
 def not_valid(verdict: Verdict, *figures: Figure) -> str:
-    """Why one of some figures does not hold, without a number; empty if all hold."""
+    """Reason why one of some values is not valid, without a number; empty if all are valid."""
     if not set(figures) & set(verdict.not_valid):
         return ""
     return f"{NOT_VALID}: {reason(verdict)}"

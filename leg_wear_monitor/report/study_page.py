@@ -102,7 +102,7 @@ def study_page(results: StudyResults) -> Page:
 
 
 def _question(results: StudyResults) -> list[Part]:
-    """The ensemble in words, and the leg."""
+    """Description of the ensemble, and a picture of the leg."""
     ensemble = results.settings.ensemble
     text = (
         f"Each value is a mean over {ensemble.runs} runs with different initial crank angles and journal "
@@ -192,7 +192,7 @@ def _error_table(found: Found) -> Table:
 
 
 def _sum_table(found: Found) -> list[Table]:
-    """Errors of all clearances at once against the sum of each place, if the last point has all joints."""
+    """Errors with all clearances, compared with the sum over the places, if the last point has all joints."""
     *others, (_, whole) = found
     alone, each = [], set[str]()
     for _, arrays in others:

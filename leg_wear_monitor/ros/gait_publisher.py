@@ -129,7 +129,7 @@ def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> Join
 
 def _break(message: Message, fault: int) -> None:
     """Inject a fault into a message; a torque message can only lack its stamp or a finite value."""
-    if isinstance(message, Bool):  # a Bool has neither a stamp nor a number
+    if isinstance(message, Bool):  # a Bool has no stamp and no number
         return
     if fault == ZERO_STAMP and not isinstance(message, Float64):
         message.header.stamp = Time()

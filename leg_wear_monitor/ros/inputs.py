@@ -263,7 +263,7 @@ class Publishers:
 
 
 def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Publishers:
-    """Publishers of a topic, from the graph, which shows when one of them is gone; events do not.
+    """Publishers of a topic in the graph. Events do not report publishers that disappear; the graph does.
 
     Parameters
     ----------
@@ -399,7 +399,7 @@ class InputTopic:
 class Inputs:
     """Subscriptions to the configured inputs, whose messages are taken all at once.
 
-    An executor's call for each message takes more time than all else that is done with it. They are best
+    Calls of an executor per message would take longer than the processing of the messages. They are best
     effort, which is compatible with reliable publishers.
 
     Parameters

@@ -180,8 +180,8 @@ def undone(joint: str, wear: JointWear) -> str:
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
-# Period at which messages are taken and processed. Each turn has its cost, whatever comes in it: 5 ms, with
-# processing when a spline node is complete, takes 4 % of a core more and reports 25 ms sooner.
+# Period of taking and processing messages. Each turn costs processor time: a period of 5 ms would take 4 %
+# more of a core and report 25 ms earlier.
 _TAKE_S = 0.05
 # Period at which a thread takes messages as well. A reference keeps the node busy for up to ten seconds on
 # the leg's computer, and the middleware holds five seconds at 1 kHz.
@@ -223,7 +223,7 @@ class MonitorNode(ClosingNode):
         try:
             self._get_ready(parameters)
         except BaseException:  # signals included: the next start must not consider the ledger truncated
-            with self._in_order:  # in any state of the ledger
+            with self._in_order:  # independent of the state of the ledger
                 self._monitor.close()
             raise
 

@@ -322,7 +322,7 @@ class Outlets:
         """Record and publish messages of equal length, (n, bytes)."""
         self._black_box.write(self._topics[output], now_ns, rows)
         size, whole, handle = rows.shape[1], rows.tobytes(), self._publishers[output].handle
-        with until_down(self._context), handle:  # as `publish`, which checks the kind of each message
+        with until_down(self._context), handle:  # like `publish`, which checks the type of each message
             for at in range(0, len(whole), size):
                 handle.publish_raw(whole[at : at + size])
 

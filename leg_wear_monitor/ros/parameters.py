@@ -136,7 +136,7 @@ class ParameterNode(Node):
         of_topic = f"{_QOS_OVERRIDES}{self.resolve_topic_name(topic)}."
         given = {name: value for name, value in self.given.items() if name.startswith(of_topic)}
         for name, value in given.items():
-            # the middleware prints lines of its own for it, and rclpy a signature
+            # otherwise the middleware prints its own lines, and rclpy prints a signature
             if name.endswith(".depth") and isinstance(value, int) and not 0 <= value <= _MOST_DEPTH:
                 fault = f"{value} is not from 0 to {_MOST_DEPTH} messages"
                 raise ConfigError(self.get_fully_qualified_name(), name, fault)

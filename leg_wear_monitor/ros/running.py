@@ -109,7 +109,7 @@ _MMAP_THRESHOLD, _LARGE_BYTES = -3, 2**18  # M_MMAP_THRESHOLD of glibc's malloc.
 
 
 def release_large_arrays() -> None:
-    """Have each large array given back to the system when it is freed, where the C library can.
+    """Return each large array to the system when it is freed, if the C library supports it.
 
     By default, glibc keeps freed arrays of up to 32 MB for reuse once it has seen some: 40 MB of the 260 MB
     of a walking node, and 300 MB of a node that identifies a leg.

@@ -156,7 +156,7 @@ def _by_derivative(leg: Responses) -> Estimate:
 
 
 def _apart_from_sum(leg: Responses) -> Estimate:
-    """How far errors of all at once are from the sum of the places, in the quantity where it is farthest."""
+    """Largest deviation of an error with all clearances from the sum over the places."""
     effects = []
     for name in ERRORS:
         total = np.sum([of_runs(leg, name, place) for place in PLACES], axis=0)

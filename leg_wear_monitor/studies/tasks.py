@@ -373,7 +373,7 @@ def stretches(
         Returns the state one step later; must not modify its argument.
     state, direction, scale : (n,) arrays
         Initial state, direction of the neighbour from it, and scale of each coordinate. A coordinate of scale
-        0 does not count in the distance; rescaling copies it from the first trajectory.
+        0 is not part of the distance; rescaling copies it from the first trajectory.
     distance : float
         Initial distance, in units of the scale.
     steps : int

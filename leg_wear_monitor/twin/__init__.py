@@ -37,6 +37,6 @@ CRANK, TORQUE, LOAD = 0, 1, 2  # samples with equal stamps are processed in this
 KINDS: Mapping[int, SampleKind] = {
     CRANK: SampleKind(name="crank", value="crank_angle_rad", largest=1.0e6),
     TORQUE: SampleKind(name="torque", value="torque_nm", largest=1.0e6),
-    # five tons on a foot; a person's in millinewtons is beyond
+    # five tons on a foot; the weight of a person in millinewtons is larger
     LOAD: SampleKind(name="foot_load", value="foot_force_n", largest=5.0e4),
 }

@@ -305,7 +305,7 @@ def _evaluate_speed(model, clock, stamp, speed):
 
 @kernel
 def _stops(model, state, stamp, node):
-    """Whether the crank is at rest at a spline node; updates the clock's fields of rest."""
+    """True if the crank is at rest at a spline node; updates the fields of rest in the clock."""
     clock, least = state.clock, model.stop_speed
     if clock.at_rest != 0:
         if abs(node.speed) > 2.0 * least or abs(node.angle - state.node.angle) > _RESTING:

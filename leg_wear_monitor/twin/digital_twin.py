@@ -254,7 +254,7 @@ class DigitalTwin:
         self._set_friction()
 
     def freeze_load(self, is_frozen: bool, clears: bool = False) -> bool:
-        """Go on with the measured load of the gait cycles before, because its samples are wrong.
+        """Continue with the measured load of the previous gait cycles, because the samples are wrong.
 
         Parameters
         ----------

@@ -354,7 +354,7 @@ def follow(
                 motion.failed_at_ns = motion.base_ns + round(1.0e9 * stepper.intervals[0] * model.interval)
                 return status, i, k, m
             if cuts:
-                # a cycle that ends at the passage where it began is no gait cycle
+                # a cycle that ends at the passage where it began is not a gait cycle
                 is_whole = motion.anchored != 0 and motion.anchor_turn != motion.cut_turn
                 motion.cycle_is_whole = 1 if is_whole else 0
                 motion.anchored, motion.anchor_turn = 1, motion.cut_turn

@@ -78,7 +78,7 @@ class LegParameters:
 
     @classmethod
     def none(cls, mechanism: Mechanism) -> "LegParameters":
-        """Factors of the mechanism as it is."""
+        """Factors of the unchanged mechanism."""
         return cls(np.ones(len(mechanism.bodies)), np.ones(len(mechanism.bodies)))
 
     @property
@@ -87,7 +87,7 @@ class LegParameters:
         return attrs.evolve(self, load=np.zeros((0, 2)))
 
     def is_possible(self, mechanism: Mechanism) -> bool:
-        """Whether such a leg can exist: no torque of an existing leg leads to other parameters."""
+        """True if a leg can have these values; the torque of a leg never leads to others."""
         bodies = np.append(self.mass, self.length)
         is_near = bool(((bodies >= 1.0 / _MOST) & (bodies <= _MOST)).all())
         coefficients = [self.friction * one.friction.coefficient for one in mechanism.clearances.values()]
@@ -99,7 +99,7 @@ class LegParameters:
         return attrs.evolve(self, mass=self.mass[order], length=self.length[order])
 
     def applied(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism with these factors; the compliance is none of it."""
+        """The mechanism with these factors; the compliance is not part of the mechanism."""
         bodies = {}
         for (name, body), mass, length in zip(mechanism.bodies.items(), self.mass, self.length, strict=True):
             bodies[name] = attrs.evolve(
@@ -189,7 +189,7 @@ class CrankProfile:
         return float(np.abs(own - others).max() / abs(other.speed))
 
     def is_like(self, other: "CrankProfile") -> bool:
-        """Whether a torque under this motion can be compared with a torque under the other."""
+        """True if torques under the two motions can be compared."""
         return self.departure(other) <= UNLIKE
 
     def _speeds(self) -> Floats:

@@ -130,7 +130,7 @@ def gait_samples(
 
 
 def has_value_of(samples: Samples, kind: int) -> NDArray[np.bool_]:
-    """Mask (n,) of the samples of a kind with a single value, and of others that contain such a value."""
+    """Mask (n,) of the samples that contain a value of a kind, alone or with other values."""
     return np.asarray((samples["kind"] == kind) | np.isfinite(samples[KINDS[kind].value]))
 
 

@@ -265,7 +265,7 @@ class CycleStatistics:
 
     @property
     def is_steady(self) -> bool:
-        """Whether the leg walked all the time, with no gap bridged."""
+        """True if the leg walked all the time without a bridged gap."""
         return self.bridged_s == 0.0 and self.duration_s <= LONGEST * self.moving_s
 
 
@@ -332,7 +332,7 @@ class Intake:
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp to which the leg was advanced, before that the youngest one; 0 before the first."""
+        """Stamp to which the leg was advanced, at first the youngest stamp; 0 before the first sample."""
         return self.followed_stamp_ns or self.newest_stamp_ns
 
 

@@ -210,7 +210,7 @@ class ReferenceRun(Generic[FoundT]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether there is something to simulate."""
+        """True if there is a leg to simulate."""
         return len(self._done) < len(self._legs)
 
     @property
@@ -225,12 +225,12 @@ class ReferenceRun(Generic[FoundT]):
 
     @property
     def is_late(self) -> bool:
-        """Whether all of it is due, and not all is simulated."""
+        """True if all legs are due, but not all are simulated."""
         return self.is_busy and self._cost(self._legs) <= self._pace * self._periods
 
     @property
     def cycles_left(self) -> float:
-        """Commanded gait cycles until all of it is due."""
+        """Commanded gait cycles until all legs are due."""
         periods = -(-self._cost(self._legs) // self._pace) - self._periods
         return max(0, periods) / _PERIODS
 
@@ -253,7 +253,7 @@ class ReferenceRun(Generic[FoundT]):
         return self._so_far()
 
     def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> FoundT | None:
-        """Simulate the legs that are left, at once; None where one cannot be simulated."""
+        """Simulate the remaining legs immediately; None if one of them cannot be simulated."""
         found = None
         while self.is_busy:
             found = self.advance(waits=True)
@@ -319,7 +319,7 @@ class ReferenceRun(Generic[FoundT]):
         return pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth, cycles)
 
     def _catch_up(self) -> None:
-        """Let threads of the program's own priority simulate the next legs, where the others are behind.
+        """Let threads of normal priority simulate the next legs if the threads of low priority are behind.
 
         On a machine with a load of 18, threads of low priority had a hundredth of a core: the node waited
         for more than half a minute.
@@ -332,7 +332,7 @@ class ReferenceRun(Generic[FoundT]):
             self._hurried.append(self._ahead[i])
 
     def _cost(self, legs: Sequence[Leg]) -> int:
-        """Gait cycles that are simulated for some legs, with those in which they settle."""
+        """Gait cycles simulated for some legs, including the cycles in which they settle."""
         return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
 
     def _simulated(
@@ -347,7 +347,7 @@ class ReferenceRun(Generic[FoundT]):
                 profile, leg.parameters, leg.clearance_m, depth, _SETTLING, cycles,
                 lambda: self._wanted is wanted,
             )  # fmt: skip
-        except AssemblyError:  # with such lengths it does not close
+        except AssemblyError:  # the linkage does not close with such lengths
             return None
         return None if found is None else self._kept(found)
 

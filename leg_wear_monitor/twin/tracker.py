@@ -65,7 +65,7 @@ LARGEST_ANGLE, LARGEST_TORQUE, LARGEST_FORCE = (KINDS[kind].largest for kind in 
 
 @kernel
 def find_fault(sample):
-    """Fault of a sample: the one that it arrived with, else the first one found."""
+    """Fault of a sample: the fault on arrival, otherwise the first fault found."""
     if sample.fault != NO_FAULT:
         return min(sample.fault, OUT_OF_RANGE)
     if sample.kind == CRANK:
@@ -87,7 +87,7 @@ def find_fault(sample):
 
 @kernel
 def _was_released(state, sample):
-    """Whether a late sample repeats a released one."""
+    """True if a late sample repeats a released sample."""
     clock, queue, stamp, kind = state.clock, state.queue, sample.stamp_ns, sample.kind
     if stamp == clock.released_ns:
         return (clock.released_kinds >> kind) & 1 == 1
@@ -121,8 +121,8 @@ DROP_IT, KEEP_IT, AFTER_JUMP = range(3)
 def arrive(state, sample):
     """Decision on a sample, by its stamp and the previous ones.
 
-    A stamp far from the others is accepted only after a second one follows it: one wrong clock reading must
-    not lose the track.
+    A stamp far from the other stamps is accepted only after a second such stamp, because one wrong clock
+    reading must not end the tracking.
     """
     clock, count, candidate = state.clock, state.counts, state.candidate
     stamp, kind = sample.stamp_ns, sample.kind

@@ -110,7 +110,7 @@ def _compile(out: Path) -> None:
     log_path = out / "compilation.log"
     with (
         log_path.open("wb") as log,
-        # a group of its own: Ctrl-C reaches it by us, once
+        # its own process group, so that Ctrl-C reaches it only once, through us
         subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
         closed_on_interrupt(leg.kill),
     ):
@@ -170,7 +170,7 @@ def _listen(out: Path) -> dict[str, Any]:
 
 @contextmanager
 def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
-    """A node as a process of its own, ended as from a terminal."""
+    """A node in its own process, which ends it as a terminal does."""
     from leg_wear_monitor.workers import python_command
 
     command = python_command(program, verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}")

@@ -46,7 +46,7 @@ def opened(
     with common.compilation():
         monitor = open_monitor(leg, settings, at_end=True)
     try:
-        if config is None:  # by different limits, a stop could end
+        if config is None:  # different limits could end a stop
             for doubt in (*monitor.limit_doubts, *monitor.coefficient_doubts):
                 raise ConfigError("--config", "", f"{doubt}; name the parameter file of this leg")
         common.warn_of(str(config), monitor.coefficient_doubts)
@@ -83,7 +83,7 @@ def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
     return common.WITH_FINDINGS if has_codes(reply) else 0
 
 
-# ``leg-wear-monitor acknowledge``: alarms that an operator has seen to.
+# ``leg-wear-monitor acknowledge``: acknowledge alarms.
 
 
 @click.command(short_help="Acknowledge the alarms.")

@@ -340,7 +340,7 @@ def turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, 
 
 @kernel
 def _let_yield(inertia, torque, now, x, v, by_v, along, by_speed):
-    """Let the crank yield: change the step tables ``now`` of a part in which a torque [N m] acts on it.
+    """Let a torque [N m] move the crank: change the step tables ``now`` of a part of a step.
 
     ``inertia``: of the crank with all clearance joints open [kg m^2]. Rows of x: ``v`` has the rates at the
     begin, ``by_v`` the coefficients of e' in the drive torque; ``along`` and ``by_speed`` are room.

@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 
 MEMBERS = 1021
 _MULTIPLIER = 333
-_SHIFT = 631  # moves each dimension by a different amount, so that no member lies in a corner of all
+_SHIFT = 631  # shifts each dimension by a different amount, so that no member is extreme in all dimensions
 
 
 @cache

@@ -118,7 +118,7 @@ def _greatest(*columns: Floats, otherwise: float = 0.0) -> float:
 
 
 def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
-    """Chart of a joint over time, and the reason if something is not shown; empty without any data."""
+    """Chart of a joint over time, with the reason for omitted values; empty without data."""
     panels: list[Panel] = []
     doubts: list[Part] = []
     for name, figure, panel in (

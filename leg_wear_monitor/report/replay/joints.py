@@ -219,7 +219,7 @@ def _life_axis(lives: Sequence[LifeHours | None]) -> tuple[int, int] | None:
 
 
 def _life(hours: LifeHours | None, axis: tuple[int, int] | None) -> dict[str, Any] | None:
-    """Bar from p10 to p90 with p50, and these in words."""
+    """Bar from p10 to p90 with a mark at p50, and the same values as text."""
     if hours is None or axis is None:
         return None
     low, decades = axis[0], float(axis[1] - axis[0])

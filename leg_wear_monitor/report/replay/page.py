@@ -56,7 +56,7 @@ def raised_alarms(summary: ReplaySummary, otherwise: str) -> str:
 
 
 def _raised(summary: ReplaySummary, alarm: LegAlarm) -> dict[str, str]:
-    """A raised alarm in words, without a value that the verdict does not believe."""
+    """A raised alarm as a sentence, without its value if the verdict marks it as not valid."""
     symbol, look = LEVEL_LOOKS[alarm.level]
     joint = joint_of(alarm.name)
     name = f"{alarm.name.removesuffix(joint)}{summary.leg.joint_words(joint)}" if joint else alarm.name

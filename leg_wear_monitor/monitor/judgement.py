@@ -17,13 +17,17 @@ from leg_wear_monitor.monitor.reports import AlarmList, VerdictReport
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import (
     COUNTED,
+    SEEN,
     JointSituation,
     KnownClearance,
     Situation,
-    alarm_value,
     at_limit_by_estimate,
     believed,
+    is_observed,
+    is_surely_below,
     joint_status,
+    judged,
+    surely_at,
     surest,
 )
 from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
@@ -78,11 +82,32 @@ def evaluate_clearances(
     board, values, sources = leg.evaluation.board, {}, {}
     for joint in joints:
         name = alarm_specs.CLEARANCE.name(joint.joint)
-        known = alarm_value(joint, board.alarms[name])
+        known = _alarm_value(joint, board.alarms[name])
         if known is not None:
             values[name], sources[name] = known.clearance_m, (known.sigma_m, known.by)
     cycles = leg.config.alarms.on_delay_cycles
     return board.evaluate(values, stamp_ns, cycles, sources) if values else ()
+
+
+def _alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
+    """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
+
+    A modelled clearance is evaluated once per gait cycle, unless a different source keeps the alarm present.
+    """
+    known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
+    if sure is not None and sure.clearance_m > known.clearance_m:
+        return sure
+    # only the torque clears an estimate of the torque: a new run shows nothing for a while
+    is_back = shown is not None and _takes_back(shown, joint.limit_m)
+    if is_observed(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
+        return None
+    return None if known.by == COUNTED and not is_observed(alarm) else known
+
+
+def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
+    """Whether an estimate below a limit is sure, or has held as long as one beyond it has to."""
+    is_below = shown.clearance_m < limit_m and math.isfinite(shown.least_m)
+    return is_below or is_surely_below(limit_m, shown)
 
 
 def shown(leg: MonitoredLeg, joint: JointSituation) -> KnownClearance | None:

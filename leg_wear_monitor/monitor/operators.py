@@ -286,7 +286,7 @@ def _ends(joint: JointSituation, alarm: Alarm) -> bool:
         return False
     if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:
         return False  # an unused measurement does not end an alarm of an earlier measurement
-    return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
+    return is_surely_below(joint.limit_m, joint.measured)
 
 
 def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:

@@ -26,7 +26,7 @@ from leg_wear_monitor.monitor.input_health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import Status, VerdictReport
-from leg_wear_monitor.monitor.verdict.situation import believed_words
+from leg_wear_monitor.monitor.verdict.situation import SOURCES, KnownClearance
 from leg_wear_monitor.monitor.verdict.verdict import (
     estimate,
     level_of,
@@ -195,7 +195,7 @@ def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]
         }
         if known.best_estimate_sigma_m is not None:
             values["best_estimate_sigma_m"] = known.best_estimate_sigma_m
-        message = f"{believed_words(known)}; {message}"
+        message = f"{_best_estimate(known)}; {message}"
     joint = attrs.evolve(joint, values=values, message=message)
     if not findings:
         return joint
@@ -206,6 +206,14 @@ def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]
         return joint
     message = f"{worst.state.words}: {message}"
     return attrs.evolve(joint, level=level, fault_code=worst.fault_code, message=message)
+
+
+def _best_estimate(one: JointClearance) -> str:
+    """The best estimate, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
+    if one.best_estimate_m is None or one.best_estimate_source is None:
+        return ""
+    known = KnownClearance(one.best_estimate_source, one.best_estimate_m, or_nan(one.best_estimate_sigma_m))
+    return f"{known.words} according to {SOURCES[known.by]}"
 
 
 def _load_values(load: BushingLoad) -> dict[str, float]:

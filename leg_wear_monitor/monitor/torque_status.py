@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.gait_evidence import TorqueRecord, offset_error_ra
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.verdict.causes import explanation, sentence
 from leg_wear_monitor.monitor.verdict.table import words_of_cause
-from leg_wear_monitor.monitor.verdict.verdict import diagnosis_words, with_unit
+from leg_wear_monitor.monitor.verdict.verdict import with_unit
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared
 
@@ -131,3 +131,38 @@ def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
         name = f"{row.name}_{one.subject}".rstrip("_")
         values |= {with_unit(name, row.unit): one.value, with_unit(f"{name}_sigma", row.unit): one.sigma}
     return values
+
+
+# State of the diagnosis in words, without the values that change in each gait cycle.
+
+
+_STATES = {
+    DiagnosisState.OFF: "off",
+    DiagnosisState.WAITING: "waiting",
+    DiagnosisState.AS_MODELLED: "the drive torque agrees with the modelled clearances",
+    DiagnosisState.CHANGED: "the drive torque shows a change",
+}
+
+
+def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
+    """State, reason, and the joints (k,) that the drive torque does not show."""
+    sentences = [_STATES[diagnosis.state]]
+    if diagnosis.reason:
+        sentences.append(diagnosis.reason)
+    if diagnosis.next_step:
+        sentences.append(diagnosis.next_step)
+    hidden = unseen(diagnosis, joints)
+    if diagnosis.clearance_m and hidden:
+        sentences.append(f"not observable: {', '.join(hidden)}")
+    if diagnosis.bodies:
+        sentences.append("the model uses the masses, lengths and friction that the drive torque shows")
+    return "; ".join(sentences)
+
+
+def unseen(diagnosis: Diagnosis, joints: Sequence[str]) -> tuple[str, ...]:
+    """Joints whose clearance the drive torque does not show."""
+    if not diagnosis.clearance_m:
+        return tuple(joints)
+    return tuple(
+        joint for joint, value in zip(joints, diagnosis.clearance_m, strict=True) if math.isnan(value)
+    )

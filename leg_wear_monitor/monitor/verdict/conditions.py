@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause
-from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
+from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, QUANTITIES, SILENCE
 from leg_wear_monitor.monitor.alarms import (
     ADVICE,
     CAUSES_OF_ALARMS,
@@ -24,7 +24,6 @@ from leg_wear_monitor.monitor.verdict.situation import (
     SEEN,
     SOURCES,
     JointSituation,
-    KnownClearance,
     Situation,
     at_limit_by_estimate,
 )
@@ -83,41 +82,32 @@ def has_fault(code: str) -> Condition:
 
 def raised(*kinds: str, least: Level = Level.ERROR, most: Level = Level.ERROR) -> Condition:
     """Alarms of some kinds (all if none is given) between two levels."""
-    return lambda situation: [
-        hit_of(alarm, situation)
-        for alarm in situation.alarms
-        if least <= alarm.level <= most and (not kinds or alarm.kind in kinds)
-    ]
+    return lambda situation: _of_alarms(
+        situation, lambda alarm: least <= alarm.level <= most and (not kinds or alarm.kind in kinds)
+    )
 
 
-_OF_INPUT = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
+def _of_alarms(situation: Situation, holds: Callable[[Alarm], bool]) -> list[Hit]:
+    return [hit_of(alarm, situation) for alarm in situation.alarms if holds(alarm)]
+
+
+def _is_of_input(alarm: Alarm) -> bool:
+    """Whether an alarm is a present fault of the samples."""
+    return alarm.present is Level.ERROR and alarm.kind in (*INPUT_KINDS, SILENCE)
 
 
 def blinding(situation: Situation) -> Sequence[Hit]:
     """Present faults of the crank's input; without torque or foot load, the model continues."""
-    return [
-        hit_of(alarm, situation)
-        for alarm in situation.alarms
-        if alarm.present is Level.ERROR
-        and alarm.kind in _OF_INPUT
-        and alarm.subject not in ("torque", "foot_load")
-    ]
+    own = ("torque", "foot_load")
+    return _of_alarms(
+        situation,
+        lambda alarm: _is_of_input(alarm) and alarm.subject not in own and alarm.kind != "input_torque",
+    )
 
 
 def of_foot_load(situation: Situation) -> Sequence[Hit]:
     """Present lack of samples of the foot load."""
-    lack = (each for each in situation.alarms if each.subject == "foot_load" and each.present is Level.ERROR)
-    return [hit_of(alarm, situation) for alarm in lack]
-
-
-ERROR_OF = "standard error of "
-"""Before the name of some evidence, the name of its standard error."""
-
-
-def known_evidence(name: str, known: KnownClearance, limit_m: float) -> tuple[Evidence, ...]:
-    """A clearance as evidence, with its standard error if that is known."""
-    error = Evidence(f"{ERROR_OF}{name}", known.sigma_m, None, "m")
-    return (Evidence(name, known.clearance_m, limit_m, "m"), *([] if math.isnan(known.sigma_m) else [error]))
+    return _of_alarms(situation, lambda alarm: _is_of_input(alarm) and alarm.subject == "foot_load")
 
 
 _KNOWN_BY = {MEASURED: "measured", BOTH: "estimated"}
@@ -138,10 +128,10 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     noun = QUANTITIES.get(alarm.name) or QUANTITIES.get(alarm.kind) or alarm.name.replace("_", " ")
     joint = situation.joint_words(own)
     evidence = [Evidence(alarm.name, value, alarm.limit, alarm.unit)]
-    each = next((each for each in situation.joints if each.joint == own and alarm.kind == "clearance"), None)
+    each = situation.joint(own) if alarm.kind == "clearance" else None
     if each is not None and each.measured is not None and value > each.modelled_m:
-        evidence += known_evidence(f"measured clearance {own}", each.measured, each.limit_m)
-        evidence.append(Evidence(f"modelled clearance {own}", each.modelled_m, each.limit_m, "m"))
+        pairs = (("measured", each.measured.clearance_m), ("modelled", each.modelled_m))
+        evidence += [Evidence(f"{by} clearance {own}", known_m, each.limit_m, "m") for by, known_m in pairs]
     return Hit(
         words={
             "quantity": f"{noun} of joint {joint}" if own else noun,
@@ -209,10 +199,7 @@ def _diagnosed(code: str, situation: Situation) -> list[Hit]:
     """Significant changes that the diagnosis shows, other than of a clearance."""
     return [
         Hit(
-            words={
-                "causes": f": {words_of(change, situation)}{doubt(situation)}",
-                "remedy": remedy(change),
-            },
+            words={"causes": f": {words_of(change, situation)}{doubt(situation)}", "remedy": remedy(change)},
             since_ns=change.since_ns,
             evidence=(evidence_of(change),),
         )
@@ -257,10 +244,9 @@ def words_of(change: Change, situation: Situation) -> str:
         if change.value < change.counted:
             words += ", less than before: if its part was replaced, reset the joint"
     elif change.cause is Cause.SEVERAL:
-        joints = (
-            f"{situation.joint_words(one.subject)} {estimate(one.value, one.sigma, 'm')}"
-            for one in change.joints
-        )
+        names = [situation.joint_words(one.subject) for one in change.joints]
+        sizes = [estimate(one.value, one.sigma, "m") for one in change.joints]
+        joints = map(" ".join, zip(names, sizes, strict=True))
         words = f"change of several joints: {' and '.join(joints)}"
     else:
         words = sentence(change, situation.diagnosis)
@@ -301,8 +287,10 @@ def modelled_at_limit(situation: Situation) -> Sequence[Hit]:
     The forecast is valid only if it has the joint at its limit as well: not with a measurement that it does
     not use, or uses only in part, and not with an alarm that is only latched.
     """
-    alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
-    hits = [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+    hits = _of_alarms(
+        situation,
+        lambda alarm: alarm.kind == "clearance" and alarm.level is Level.ERROR and alarm.cause not in SEEN,
+    )
     below = {each.joint for each in situation.joints if not _forecast_m(each) >= each.limit_m}  # NaN, too
     return [attrs.evolve(hit, not_valid=(Figure.FORECAST,)) if hit.joint in below else hit for hit in hits]
 
@@ -317,9 +305,9 @@ def detected_at_limit(situation: Situation) -> Sequence[Hit]:
 
     The estimate stays until an operator acknowledges it, or a measurement contradicts it.
     """
-    hits = []
+    hits, alarms = [], {one.subject: one for one in situation.alarms if one.kind == "clearance"}
     for each in situation.joints:
-        alarm = situation.alarm_of(each.joint)
+        alarm = alarms.get(each.joint)
         seen = at_limit_by_estimate(each, alarm)
         if seen is None:
             continue
@@ -338,8 +326,8 @@ def detected_at_limit(situation: Situation) -> Sequence[Hit]:
             "limit": amount(each.limit_m, "m"),
             "past": past + unsure,
         }
-        evidence = known_evidence(f"clearance {each.joint} by {seen.by}", seen, each.limit_m)
-        hits.append(Hit(words=words, joint=each.joint, since_ns=raised_ns, evidence=evidence))
+        evidence = Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m")
+        hits.append(Hit(words=words, joint=each.joint, since_ns=raised_ns, evidence=(evidence,)))
     return hits
 
 
@@ -386,9 +374,9 @@ def corrected(situation: Situation) -> Sequence[Hit]:
 def _clearance_hits(change: Change, situation: Situation, addition: str = "") -> list[Hit]:
     """A changed clearance with the measurement of its joint, or joints that explain a change together."""
     joints: Sequence[NamedCause] = change.joints if change.cause is Cause.SEVERAL else (change,)
-    measured = next((each.measured for each in situation.joints if each.joint == change.subject), None)
-    if measured is not None and measured.words not in addition:
-        addition += f"; {measured.words} was measured"
+    own = situation.joint(change.subject)
+    if own is not None and own.measured is not None and own.measured.words not in addition:
+        addition += f"; {own.measured.words} was measured"
     words = {"change": f"{words_of(change, situation)}{addition}"}
     return [
         Hit(

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, NamedCause, TorqueExplanation
-from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarms import Alarm, amount
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.input_health import InputFault
 from leg_wear_monitor.monitor.verdict.verdict import estimate
-from leg_wear_monitor.state import JointClearance, Level, State, Verdict
+from leg_wear_monitor.state import Level, State, Verdict
 from leg_wear_monitor.twin import KINDS
 
 # All inputs of a verdict; the defaults describe a leg without a fault.
@@ -144,8 +143,12 @@ class Situation:
 
     def joint_words(self, joint: str) -> str:
         """A joint with its label, such as ``G (knee)``."""
-        label = next((each.label for each in self.joints if each.joint == joint), "")
-        return f"{joint} ({label})" if label else joint
+        own = self.joint(joint)
+        return f"{joint} ({own.label})" if own is not None and own.label else joint
+
+    def joint(self, name: str) -> JointSituation | None:
+        """A clearance joint by its name; None for any other."""
+        return next((each for each in self.joints if each.joint == name), None)
 
     def joints_words(self, joints: Sequence[str]) -> str:
         """Joints with their labels."""
@@ -156,17 +159,10 @@ class Situation:
         ends_ns = [end_ns for code, end_ns in self.trusted_before_ns.items() if KINDS[code].name == kind]
         return all(0 < since_ns < end_ns for end_ns in ends_ns)
 
-    def alarm_of(self, joint: str) -> Alarm | None:
-        """The alarm of a joint's clearance; None if it is not listed."""
-        own = (each for each in self.alarms if each.kind == "clearance" and each.subject == joint)
-        return next(own, None)
-
     @property
     def unobserved(self) -> tuple[str, ...]:
         """Clearance joints that no encoder shows."""
-        return tuple(
-            joint.joint for joint in self.joints if not any(seen.by == "encoders" for seen in joint.seen)
-        )
+        return tuple(each.joint for each in self.joints if "encoders" not in [one.by for one in each.seen])
 
 
 # The best estimate of a joint's clearance and its source, for all views and the clearance alarm.
@@ -181,14 +177,6 @@ SOURCES = {
     "torque": "the drive torque",
     "encoders": "the joint encoders",
 }
-
-
-def believed_words(one: JointClearance) -> str:
-    """The best estimate, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
-    if one.best_estimate_m is None or one.best_estimate_source is None:
-        return ""
-    known = KnownClearance(one.best_estimate_source, one.best_estimate_m, or_nan(one.best_estimate_sigma_m))
-    return f"{known.words} according to {SOURCES[known.by]}"
 
 
 def judged(joint: JointSituation) -> KnownClearance:
@@ -212,9 +200,9 @@ def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance 
     return surest(one for one in seen if one.least_m >= limit_m)
 
 
-def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
-    """Whether a measured clearance contradicts that a joint is at its limit."""
-    return clearance_m + SURE_SIGMAS * sigma_m < limit_m
+def is_surely_below(limit_m: float, known: KnownClearance) -> bool:
+    """Whether a clearance contradicts that a joint is at its limit."""
+    return known.clearance_m + SURE_SIGMAS * known.sigma_m < limit_m
 
 
 def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
@@ -226,10 +214,8 @@ def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
     """
     if alarm is None or joint.measured is None or not alarm.acknowledged or alarm.cause not in SEEN:
         return False
-    is_counted_below = not judged(joint).clearance_m >= joint.limit_m
-    return is_counted_below and is_surely_below(
-        joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m
-    )
+    is_modelled_below = not judged(joint).clearance_m >= joint.limit_m
+    return is_modelled_below and is_surely_below(joint.limit_m, joint.measured)
 
 
 def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> KnownClearance | None:
@@ -267,27 +253,6 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Verdict]) -> Sta
     is_blind = any(finding.state is State.NOT_MONITORED for finding in findings)
     found.append(State.HEALTHY if is_known and not is_blind else State.NOT_MONITORED)
     return max(found, key=lambda state: state.severity)
-
-
-def alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
-    """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
-
-    A modelled clearance is evaluated once per gait cycle, unless a different source keeps the alarm present.
-    """
-    known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
-    if sure is not None and sure.clearance_m > known.clearance_m:
-        return sure
-    # only the torque clears an estimate of the torque: a new run shows nothing for a while
-    is_back = shown is not None and _takes_back(shown, joint.limit_m)
-    if is_observed(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
-        return None
-    return None if known.by == COUNTED and not is_observed(alarm) else known
-
-
-def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
-    """Whether an estimate below a limit is sure, or has held as long as one beyond it has to."""
-    is_below = shown.clearance_m < limit_m and math.isfinite(shown.least_m)
-    return is_below or is_surely_below(limit_m, shown.clearance_m, shown.sigma_m)
 
 
 def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:

@@ -1,12 +1,10 @@
 """The verdict: state, joints, reason, action."""
 
-import math
 from collections.abc import Iterable, Sequence
 
 import attrs
 
 from leg_wear_monitor.monitor.alarms import amount, guide_of
-from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 
@@ -83,38 +81,3 @@ def with_unit(name: str, unit: str) -> str:
 def estimate(value: float, sigma: float, unit: str) -> str:
     """A value [SI] and its standard deviation, such as ``0.62 mm ± 0.03 mm``."""
     return f"{amount(value, unit)} ± {amount(sigma, unit)}"
-
-
-# State of the diagnosis in words, without the values that change in each gait cycle.
-
-
-_STATES = {
-    DiagnosisState.OFF: "off",
-    DiagnosisState.WAITING: "waiting",
-    DiagnosisState.AS_MODELLED: "the drive torque agrees with the modelled clearances",
-    DiagnosisState.CHANGED: "the drive torque shows a change",
-}
-
-
-def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
-    """State, reason, and the joints (k,) that the drive torque does not show."""
-    sentences = [_STATES[diagnosis.state]]
-    if diagnosis.reason:
-        sentences.append(diagnosis.reason)
-    if diagnosis.next_step:
-        sentences.append(diagnosis.next_step)
-    hidden = unseen(diagnosis, joints)
-    if diagnosis.clearance_m and hidden:
-        sentences.append(f"not observable: {', '.join(hidden)}")
-    if diagnosis.bodies:
-        sentences.append("the model uses the masses, lengths and friction that the drive torque shows")
-    return "; ".join(sentences)
-
-
-def unseen(diagnosis: Diagnosis, joints: Sequence[str]) -> tuple[str, ...]:
-    """Joints whose clearance the drive torque does not show."""
-    if not diagnosis.clearance_m:
-        return tuple(joints)
-    return tuple(
-        joint for joint, value in zip(joints, diagnosis.clearance_m, strict=True) if math.isnan(value)
-    )

@@ -1,10 +1,8 @@
 """Time integration in full coordinates: adaptive steps and contact events (physics.md section 2)."""
 
 import math
-from copy import copy
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import entry, kernel
@@ -276,8 +274,7 @@ class FullRun:
         self.toe: Toe = ideal_toe(linkage, setup.speed) if driven else NO_TOE
         self.polynomial = steady_drive(0.0, setup.speed)
         sectors = setup.surfaces.depth.shape[2]
-        self._tolerances = tolerance_m, tolerance_m * TOLERANCE_RATE
-        self._work = full_work(self.model, *self._tolerances, sectors)
+        self._work = full_work(self.model, tolerance_m, tolerance_m * TOLERANCE_RATE, sectors)
         self.advance(0.0, new_run_statistics(0))  # evaluates the initial state for `sample`
 
     @property
@@ -326,19 +323,6 @@ class FullRun:
         )
         if status != DONE:
             raise stop(self._setup, status, k, self.time)
-
-    def branch(self) -> "FullRun":
-        """An independent copy of the run in its present state."""
-        run = copy(self)
-        surfaces = self._setup.surfaces._replace(depth=self._setup.surfaces.depth.copy())
-        run._setup = attrs.evolve(self._setup, surfaces=surfaces)
-        run.state = FullState(*(part.copy() for part in self.state))
-        run._work = full_work(run.model, *self._tolerances, surfaces.depth.shape[2])
-        return run
-
-    def sample_at(self, _t: float) -> Sample:
-        """The present state of the leg: this formulation can be advanced to any time."""
-        return self.sample()
 
     def sample(self) -> Sample:
         """The present state of the leg."""

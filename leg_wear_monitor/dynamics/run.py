@@ -1,7 +1,7 @@
-"""Shared parts of both formulations: interface, crank motion, statistics of a run, traces, Runge-Kutta."""
+"""Shared parts of both formulations: interface, crank motion, statistics of a run, Runge-Kutta."""
 
 import math
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol
 
 import attrs
 import numpy as np
@@ -353,58 +353,6 @@ def stop(setup: Setup, status: int, k: int, time: float) -> SimulationError:
     return SimulationError(
         f"{setup.linkage.mechanism.source}: {where}at t = {time:.6g} s: {_REASONS[status]}"
     )
-
-
-# Traces: samples at equal times, taken on branches of a run so that they do not change the run.
-
-
-_ROUNDING = 1.0e-9  # tolerance for rounding of sums of steps, as a fraction of a step
-
-
-class Traceable(Run, Protocol):
-    """A run that can be branched."""
-
-    def branch(self) -> Self:
-        """An independent copy of the run in its present state."""
-
-    def sample_at(self, t: float) -> Sample:
-        """The leg at a time [s] to which the run was advanced, up to its own time step."""
-
-
-class Tracer:
-    """Takes the samples between the instants to which a run is advanced.
-
-    Parameters
-    ----------
-    run : Traceable
-    joints : int
-        Number of joints of the mechanism.
-    begin, end : float, s
-        Begin and end of the trace; no sample is taken at the end.
-    step : float, s
-        Time between samples; infinite for no samples.
-
-    Attributes
-    ----------
-    samples : list of Sample
-    """
-
-    def __init__(self, run: Traceable, joints: int, begin: float, end: float, step: float) -> None:
-        self._run, self._begin, self._step = run, begin, step
-        self._count = 0 if math.isinf(step) else max(1, math.ceil((end - begin) / step - _ROUNDING))
-        self.samples: list[Sample] = []
-        self._unused = new_run_statistics(joints)  # of the branches
-
-    def look_ahead(self, t: float) -> None:
-        """Take the samples up to a time [s], before the run is advanced to it."""
-        branch = None
-        while len(self.samples) < self._count:
-            due = self._begin + len(self.samples) * self._step
-            if due >= t - _ROUNDING * self._step:
-                break
-            branch = branch or self._run.branch()
-            branch.advance(due, self._unused)
-            self.samples.append(branch.sample_at(due))
 
 
 # The embedded Runge-Kutta pair of order 5(4) of Dormand and Prince 1980, first same as last.

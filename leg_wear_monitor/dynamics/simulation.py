@@ -11,10 +11,10 @@ import numpy as np
 
 from leg_wear_monitor.configuration.strict import shown
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
+from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.result import JointResult, SimulationResult, ToeResult, TorqueResult, Trace
-from leg_wear_monitor.dynamics.run import Setup, Traceable, Tracer, new_run_statistics
+from leg_wear_monitor.dynamics.run import Run, Sample, Setup, new_run_statistics
 from leg_wear_monitor.dynamics.statistics import (
     CycleScatter,
     drive_torque,
@@ -188,7 +188,7 @@ def _trace(setup: Setup, motion: IdealMotion, cycles: float, begin: float) -> Tr
     )
 
 
-MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
+MODELS: dict[str, Callable[[Setup], Run]] = {"clearance": ClearanceRun, "full": FullRun}
 
 LEAST_RPM = 0.01  # least crank speed: below it a gait cycle takes hours
 
@@ -304,8 +304,8 @@ def simulate(
         Point whose motion is reported, with its body, such as ``shank.G``; default: the point called ``toe``.
     trace : int
         Stored samples per cycle; 0 for none. The first is where counting starts: at crank angle 0 after whole
-        ``skip_cycles``, and of the ideal leg. They do not change the run. Each is integrated to its own
-        instant: from some hundred per cycle on, they take longer than the run.
+        ``skip_cycles``, and of the ideal leg. In model ``clearance`` they are taken at the end of an interval
+        and do not change the run; in model ``full``, each sample ends a step.
     intervals : int, optional
         Resolution of model ``clearance``: intervals of time per gait cycle, `LEAST_INTERVALS` or more;
         default: 2048. Inside them, steps adapt to a local error. 1024 take a tenth less time, and change mean
@@ -353,7 +353,7 @@ def simulate(
     model = model or default_model(mechanism)
     if not isinstance(model, str) or model not in MODELS:
         raise ConfigError("model", "", f"{shown(model)} is not one of {', '.join(MODELS)}")
-    _check_intervals(intervals, model)
+    _check_intervals(intervals, model, trace if setup.clearance_joints else 0)
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
     if not setup.clearance_joints and isinstance(mechanism.drive, SpeedDrive):
         return ideal_result(setup, counted * abs(setup.speed) / TURN, trace, skipped * setup.speed / TURN)
@@ -376,7 +376,10 @@ def _refuse(options: Mapping[str, object]) -> None:
             )
 
 
-def _check_intervals(intervals: int | None, model: str) -> None:
+def _check_intervals(intervals: int | None, model: str, trace: int) -> None:
+    if model == "clearance" and trace > (intervals or INTERVALS):
+        fault = f"{trace} points a cycle are more than the {intervals or INTERVALS} intervals. Expected fewer"
+        raise ConfigError("trace", "", f"{fault}, or more intervals")
     if intervals is None:
         return
     if model != "clearance":
@@ -427,7 +430,7 @@ def _spans(
 
 def _run(
     setup: Setup,
-    run: Traceable,
+    run: Run,
     model: str,
     skipped: float,
     counted: float,
@@ -442,13 +445,16 @@ def _run(
         run.advance(t, new_run_statistics(joints))
         report(t / (skipped + counted))
     statistics = new_run_statistics(joints)
-    tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
+    samples: list[Sample] = []
+    count = max(1, math.ceil(trace * counted / period - _ROUNDING)) if trace else 0
+    instants = skipped + np.arange(count) * (period / max(trace, 1))
     is_steady, angles = isinstance(mechanism.drive, SpeedDrive), [run.sample().crank_angle]
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
     scatter = CycleScatter(setup, statistics, stored)
-    # the run is advanced to the same instants with and without a trace, so its results are the same
     for i, t in enumerate(_instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE), start=1):
-        tracer.look_ahead(t)
+        while len(samples) < len(instants) and instants[len(samples)] < t - _ROUNDING * period:
+            run.advance(float(instants[len(samples)]), statistics)
+            samples.append(run.sample())
         run.advance(t, statistics)
         if not is_steady:
             angles.append(run.sample().crank_angle)
@@ -474,7 +480,7 @@ def _run(
         toe=toe_errors(statistics) if mechanism.toe and is_steady else None,
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, counted_cycles),
         impacts=first_impacts(setup, statistics),
-        trace=trace_of(setup, tracer.samples, model) if trace else None,
+        trace=trace_of(setup, samples, model) if trace else None,
         standard_error=scatter.standard_errors(counted_cycles),
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,

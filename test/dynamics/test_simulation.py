@@ -181,21 +181,20 @@ def test_a_torque_drive_has_no_cycles():
         simulate(load_mechanism("andrews"), cycles=1)
 
 
-@pytest.mark.parametrize("model", ["clearance", "full"])
 @pytest.mark.parametrize("points", [7, 64])
-def test_a_trace_does_not_change_the_motion(leg, model, points):
-    span = {"clearances": ("A", "G"), "cycles": 0.5, "skip_cycles": 0.1, "wear": True, "model": model}
+def test_a_trace_does_not_change_the_motion(leg, points):
+    span = {"clearances": ("A", "G"), "cycles": 0.5, "skip_cycles": 0.1, "wear": True}
     plain, traced = (simulate(leg, **span, trace=n) for n in (0, points))
     with_trace = traced.to_dict()
     trace = with_trace.pop("trace")
     assert with_trace == plain.to_dict()
     np.testing.assert_array_equal(traced.surfaces.depth, plain.surfaces.depth)
     wanted = TURN * (0.1 + np.arange(math.ceil(points / 2)) / points)
-    np.testing.assert_allclose(trace["crank_angle_rad"], wanted, atol=1e-9)
+    np.testing.assert_allclose(trace["crank_angle_rad"], wanted, atol=TURN / 2048.0)
 
 
 def test_a_trace_lies_on_the_motion(leg):
-    """Samples of two traces at the same crank angles agree, though they were taken on different branches."""
+    """Samples of two traces at the same instants agree."""
     span = {"clearances": ("G",), "cycles": 0.25, "skip_cycles": 0.0}
     few, many = (simulate(leg, **span, trace=n).trace for n in (24, 72))
     for name in ("toe_x_m", "toe_y_m", "drive_torque_nm"):

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from copy import copy
 from typing import Any, NamedTuple
 
 import attrs
@@ -311,9 +310,6 @@ def _toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) 
 # The clearance formulation as a `Run`.
 
 
-_ROUNDING = 1.0e-6  # tolerance for rounding of times at whole intervals, as a fraction of an interval
-
-
 class ClearanceRun:
     """A leg in clearance coordinates with constant crank speed.
 
@@ -335,7 +331,6 @@ class ClearanceRun:
         self.stepper = ClearanceStepper(setup, length_of(setup, intervals))
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)
-        self._ahead: tuple[ClearanceRun, RunStatistics] | None = None
 
     @property
     def time(self) -> float:
@@ -386,33 +381,6 @@ class ClearanceRun:
             stepper.state.approach > 0.0,
             stepper.state.depth[:, BUSHING].max(axis=1),
         )
-
-    def branch(self) -> "ClearanceRun":
-        """An independent copy of the run in its present state."""
-        surfaces = self._setup.surfaces._replace(depth=self.stepper.state.depth.copy())
-        run, model = copy(self), self.stepper.model
-        run._ahead = None
-        run._setup = attrs.evolve(self._setup, surfaces=surfaces)
-        run.stepper = ClearanceStepper(run._setup, model.interval, tables=model.tables)
-        run.stepper.restore(self.stepper.snapshot())
-        return run
-
-    def sample_at(self, t: float) -> Sample:
-        """The leg at a time [s] less than one interval ahead, reached by one shorter interval."""
-        stepper, rest = self.stepper, t - self.time
-        if rest <= _ROUNDING * stepper.model.interval:
-            return self.sample()
-        if self._ahead is None:  # kept for the next sample: to build a stepper takes longer than the interval
-            joints = len(self._setup.linkage.mechanism.joints)
-            self._ahead = self.branch(), new_run_statistics(joints)
-        ahead, statistics = self._ahead
-        ahead.stepper.restore(stepper.snapshot())
-        ahead.stepper.model = stepper.model._replace(interval=rest)
-        ahead.stepper.state.intervals[0] = 0.0
-        angle, speed, _ = stepper.state.drive
-        ahead._polynomial = steady_drive(angle, speed)
-        ahead.advance(rest, statistics)
-        return ahead.sample()
 
 
 # Compilation of the motion before any leg is there: types of arguments do not depend on the mechanism.

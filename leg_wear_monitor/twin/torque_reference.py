@@ -2,20 +2,17 @@
 
 A clearance shows in where in the gait cycle the torque is rough. That depends on how the crank turns, so the
 leg is simulated under the measured profile of the crank: with the clearances that are expected, and with each
-of them wider in turn. That takes seconds of a processor, so threads of low priority do it while the leg walks
-on; compiled code does not hold the interpreter's lock. The number of evaluation periods until a reference is
-ready depends only on the legs to simulate: a replay gives the same results as the live monitor.
+of them wider in turn. That takes seconds of a processor, so threads do it while the leg walks on; compiled
+code does not hold the interpreter's lock. The number of evaluation periods until a reference is ready depends
+only on the legs to simulate: a replay gives the same results as the live monitor.
 
 The reference depends on the leg's masses, lengths and friction as well: legs in which all of them change at
 once show the effect of each parameter.
 """
 
-import os
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import attrs
@@ -52,9 +49,7 @@ MASSES, FRICTIONS = (0.75, 1.4), (0.6, 1.5, 2.2, 3.2)
 # drive that is not rigid (a quarter of its resonance's width): up and down, all of them at once
 HEAVIER, LONGER, ROUGHER = 0.02, 0.002, 1.25
 
-_BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
 _SETTLING = 2  # gait cycles before those that count
-_NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
 LEAST_CLEARANCE_M = 5.0e-5
 
 HalfFloats = NDArray[np.float16]
@@ -160,9 +155,8 @@ class ReferenceRun(Generic[FoundT]):
     """Simulates legs while evaluation periods pass: the sensor signals of these legs are its reference.
 
     Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: its result
-    depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
-    as many threads as numba may use (NUMBA_NUM_THREADS); while they are behind, as many of the program's own
-    priority help.
+    depends on the number of calls alone, and a machine that is busy for a while catches up before. There is
+    one thread less than numba may use (NUMBA_NUM_THREADS).
 
     Parameters
     ----------
@@ -183,11 +177,9 @@ class ReferenceRun(Generic[FoundT]):
         self._legs: tuple[Leg, ...] = ()
         self._done: tuple[NDArray[Any], ...] = ()
         self._periods = 0
-        self._threads = numba.config.NUMBA_NUM_THREADS
-        self._pool = ThreadPoolExecutor(self._threads, "reference", _lower_priority)
-        self._urgent = ThreadPoolExecutor(self._threads, "reference-urgent")
+        self._threads = max(1, numba.config.NUMBA_NUM_THREADS - 1)  # one core is for the samples
+        self._pool = ThreadPoolExecutor(self._threads, "reference")
         self._ahead: list[Future[NDArray[Any] | None]] = []
-        self._hurried: list[Future[NDArray[Any] | None]] = []
         self._wanted = object()  # replaced as soon as no caller waits for the threads' simulations
         self._of_thread = threading.local()
 
@@ -244,7 +236,7 @@ class ReferenceRun(Generic[FoundT]):
             return None
         self._periods += 1
         is_due = self._cost(self._legs) <= self._pace * self._periods
-        can = self._take(waits or (is_due and not self.may_be_late), hurries=is_due and not waits)
+        can = self._take(waits or (is_due and not self.may_be_late))
         if not can and (is_due or self.may_be_late):
             self._begin((), self._depth, self._profile)
         if not is_due or self.is_busy or not self._legs:
@@ -277,7 +269,7 @@ class ReferenceRun(Generic[FoundT]):
         """
         for one in self._ahead:
             one.cancel()
-        self._ahead, self._hurried, self._wanted = [], [], object()
+        self._ahead, self._wanted = [], object()
 
     def _begin(self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile) -> None:
         self.leave()
@@ -290,46 +282,29 @@ class ReferenceRun(Generic[FoundT]):
         costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
         return int(np.searchsorted(costs, self._pace * self._periods, side="right"))
 
-    def _take(self, waits: bool, hurries: bool = False) -> bool:
+    def _take(self, waits: bool) -> bool:
         """Take the legs that are due and simulated, or wait for them, up to one that cannot be.
 
         Returns whether all of them can be simulated.
         """
-        self._look_ahead(hurries)
+        self._look_ahead()
         while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
             leg = self._ahead[0].result()
             if leg is None:
                 return False
             self._done, self._ahead = (*self._done, leg), self._ahead[1:]
-            self._look_ahead(hurries)
+            self._look_ahead()
         return True
 
-    def _look_ahead(self, hurries: bool = False) -> None:
+    def _look_ahead(self) -> None:
         """Let the threads simulate the next legs: not all, since a program's end waits for them."""
         simulated = len(self._done) + sum(one.done() for one in self._ahead)
-        if hurries or self._due - simulated >= _BEHIND:
-            self._catch_up()
         first = len(self._done) + len(self._ahead)
         for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
-            self._ahead.append(self._submitted(self._pool, leg))
-
-    def _submitted(self, pool: ThreadPoolExecutor, leg: Leg) -> "Future[NDArray[Any] | None]":
-        """A leg that a thread of a pool simulates."""
-        cycles = self._cycles_of(leg)
-        return pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth, cycles)
-
-    def _catch_up(self) -> None:
-        """Let threads of normal priority simulate the next legs if the threads of low priority are behind.
-
-        On a machine with a load of 18, threads of low priority had a hundredth of a core: the node waited
-        for more than half a minute.
-        """
-        self._hurried = [one for one in self._hurried if not one.done()]
-        late = [i for i, one in enumerate(self._ahead) if not (one.done() or one in self._hurried)]
-        for i in late[: self._threads - len(self._hurried)]:
-            self._ahead[i].cancel()
-            self._ahead[i] = self._submitted(self._urgent, self._legs[len(self._done) + i])
-            self._hurried.append(self._ahead[i])
+            cycles = self._cycles_of(leg)
+            self._ahead.append(
+                self._pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth, cycles)
+            )
 
     def _cost(self, legs: Sequence[Leg]) -> int:
         """Gait cycles simulated for some legs, including the cycles in which they settle."""
@@ -499,10 +474,3 @@ def _of_factors(near: LegParameters, clearance_m: Floats) -> list[Leg]:
     changed = [attrs.evolve(near, mass=mass) for mass in masses]
     changed += [attrs.evolve(near, friction=near.friction * factor) for factor in FRICTIONS]
     return [Leg(one, clearance_m) for one in changed]
-
-
-def _lower_priority() -> None:
-    """Lower the priority of this thread: samples come first."""
-    if sys.platform == "linux":  # elsewhere, it would be the whole process's priority
-        with suppress(OSError):  # if a container forbids it, the thread runs at its program's priority
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

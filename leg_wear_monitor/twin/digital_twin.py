@@ -475,29 +475,31 @@ class DigitalTwin:
         independent = max(0.25 * _CUTOFF * self._statistics.time[0], 1.0)
         sums = self._state.sums
         acting_n = self.estimate.acting
-        profile = self._with_this_step(cycle.torque_profile(sums, acting_n))
+        profile, step_nm = cycle.torque_profile(sums, acting_n), self._step_torque()
+        profile = attrs.evolve(profile, predicted_nm=profile.predicted_nm + profile.number * step_nm)
         found = cycle.find(sums, sums.number / independent, self.estimate.room)
         if found is not None:
             self.estimate.take(found, self._acts)
             self._load.set(self.estimate.acting)
             self._set_friction()
         if found is not None and is_compared:
-            self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
+            self._repeating.take(self._by_phase(profile, acting_n, step_nm))
         torque = cycle.torque_statistics(sums, found, self.estimate, self._unexplained_nm)
         return torque, profile
 
-    def _with_this_step(self, profile: TorqueProfile) -> TorqueProfile:
-        """Predicted torques under the measured load of this gait cycle, instead of the mean that acted."""
-        load, mean_n = cycle.load_profile(self._state), self._load.acting_n
+    def _step_torque(self) -> Floats:
+        """Torque (FINE_PHASES,) of the measured load of this gait cycle less the mean that acted [N m]."""
+        load, mean_n, phases = (
+            cycle.load_profile(self._state),
+            self._load.acting_n,
+            follower_state.FINE_PHASES,
+        )
         acts = self._load.rows.learned.any() and mean_n.any() and not self._state.last_load.is_frozen
         if load is None or not acts:
-            return profile
-        wide = POINTS // follower_state.FINE_PHASES  # points of a phase
-        middles = np.arange(wide // 2, POINTS, wide)
+            return np.zeros(phases)
+        middles = np.arange(POINTS // phases // 2, POINTS, POINTS // phases)
         departure = means_by_phase(load.number, load.force_n) - mean_n[middles].T
-        # by virtual work
-        torque = -(departure * self._load.toe_m[middles].T).sum(axis=0)
-        return attrs.evolve(profile, predicted_nm=profile.predicted_nm + profile.number * torque)
+        return np.asarray(-(departure * self._load.toe_m[middles].T).sum(axis=0))  # by virtual work
 
     def _by_phases(self, torque: Floats) -> Floats:
         """A torque (n,) over a turn at the commanded speed, by the phases of the residual."""
@@ -515,8 +517,12 @@ class DigitalTwin:
         self._sensor["friction"] = min(max(float(constant), 0.0), most_nm)
         self._sensor["load_friction"] = under_load
 
-    def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
-        """Residual (6, n) of the gait cycle that ends, of a sensor that averages."""
+    def _by_phase(self, profile: TorqueProfile, acting_n: float, step_nm: Floats) -> Floats:
+        """Residual (6, n) of the gait cycle that ends."""
+        if self._instants:
+            by_phase: Floats = self._state.sums.by_phase.copy()
+            by_phase[1] -= by_phase[0] * self._by_phases(step_nm)
+            return by_phase
         direction = 1 if self._state.motion.cut_rises else -1
         lag_s = self.settings.torque_lag_s, float(self.estimate.values[follower_state.LAG])
         duration_s = float(self._statistics.time[0])

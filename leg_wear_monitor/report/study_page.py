@@ -354,7 +354,7 @@ def _curves(found: Found) -> list[Gallery]:
         [
             arrays["ideal_joint_force_n"][:, np.searchsorted(arrays["joints"], arrays["clearance_joints"])],
             arrays["band_contact_force_n"],
-            np.linalg.norm(arrays["example_contact_force_n"], axis=-1),
+            arrays["example_contact_force_n"],
         ]
         for _, arrays in found
     ]

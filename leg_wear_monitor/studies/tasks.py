@@ -8,8 +8,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.batch import Leg, prepare_legs
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Moment, Snapshot
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Snapshot
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.joint import EX, EY, F_N, F_T, VX, VY
 from leg_wear_monitor.dynamics.result import JointResult
 from leg_wear_monitor.dynamics.run import (
     BEGIN,
@@ -17,6 +18,7 @@ from leg_wear_monitor.dynamics.run import (
     IMPACTS,
     SPEED,
     RunStatistics,
+    Sample,
     Setup,
     new_run_statistics,
     steady_drive,
@@ -91,11 +93,11 @@ class ObservedLeg:
         if status != DONE:
             raise stop(self.setup, status, k, self.stepper.time)
 
-    def observe(self) -> Moment:
+    def observe(self) -> Sample:
         """The present state of the leg."""
         return self.stepper.observe()
 
-    def moments(self, statistics: RunStatistics, samples: int = SAMPLES) -> Iterator[Moment]:
+    def moments(self, statistics: RunStatistics, samples: int = SAMPLES) -> Iterator[Sample]:
         """States at every step of the next cycle, from the present one on; adds to the run statistics."""
         for _ in range(samples):
             yield self.observe()
@@ -289,26 +291,31 @@ def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Flo
     return np.array([row[row[:, BEGIN] >= 0.0, SPEED].mean() if len(row) else 0.0 for row in rows])
 
 
-def _curves(moments: list[Moment], shift: int, turns_forwards: bool) -> dict[str, Floats]:
+def _curves(moments: list[Sample], shift: int, turns_forwards: bool) -> dict[str, Floats]:
     """Curves (s, ...) of one cycle by the crank angle from 0 on; the states begin at the sample ``shift``."""
-    deviation = np.array([moment.deviation for moment in moments])
+    deviation = np.array([sample.toe for sample in moments])
     curves = {
         "toe_position_m": deviation[:, 0],
         "toe_velocity_mps": deviation[:, 1],
         "toe_acceleration_mps2": deviation[:, 2],
-        "drive_torque_nm": np.array([moment.torque for moment in moments]),
-        "eccentricity_m": np.array([moment.e for moment in moments]),
-        "contact_force_n": np.array([moment.force for moment in moments]),
+        "drive_torque_nm": np.array([sample.drive_torque for sample in moments]),
+        "eccentricity_m": _rows(moments, EX, EY),
+        "contact_force_n": np.linalg.norm(_rows(moments, F_N, F_T), axis=2),
     }
     if not turns_forwards:  # angles descend
         curves, shift = {name: curve[::-1] for name, curve in curves.items()}, shift + 1
     return {name: np.roll(curve, shift, axis=0) for name, curve in curves.items()}
 
 
+def _rows(samples: list[Sample], *rows: int) -> Floats:
+    """Rows of the contacts' samples (s, k, rows), as in `dynamics.joint`."""
+    return np.array([sample.contact[list(rows)].T for sample in samples])
+
+
 def _bands(curves: dict[str, Floats], runs: int) -> Arrays:
     """Quantiles, an example and the periodicity of each curve; curves (r c, s, ...) of r runs."""
     result: Arrays = {f"example_{name}": curve[0] for name, curve in curves.items()}
-    magnitude = np.linalg.norm(curves["contact_force_n"], axis=-1)
+    magnitude = curves["contact_force_n"]
     bands = {name: curve for name, curve in curves.items() if name.startswith(("toe", "drive"))}
     bands["contact_force_n"] = magnitude
     for name, curve in bands.items():
@@ -511,10 +518,10 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     shape = (-1, len(leg.setup.clearance_joints), 2)
     return {
         "clearance_joints": np.array(leg.setup.clearance_joints),
-        "section_eccentricity_m": np.array([moment.e for moment in section]),
-        "section_rate_mps": np.array([moment.rate for moment in section]),
-        "portrait_eccentricity_m": np.array([moment.e for moment in portrait]).reshape(shape),
-        "portrait_rate_mps": np.array([moment.rate for moment in portrait]).reshape(shape),
+        "section_eccentricity_m": _rows(section, EX, EY),
+        "section_rate_mps": _rows(section, VX, VY),
+        "portrait_eccentricity_m": _rows(portrait, EX, EY).reshape(shape),
+        "portrait_rate_mps": _rows(portrait, VX, VY).reshape(shape),
     }
 
 

@@ -45,7 +45,7 @@ def test_without_clearance_the_curves_are_the_ideal_ones():
         few = {"runs": 2, "cycles": 1, "skip_cycles": 1, "traced_cycles": 1}
         arrays = run_ensemble(load_mechanism(), PLACE | few | {"clearance_m": clearance})
         errors.append([fraction_of_range(arrays, name) for name in ERRORS])
-        force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
+        force = arrays["example_contact_force_n"][:, 0]
         ideal = arrays["ideal_joint_force_n"][:, 6]
         forces.append(np.sqrt(np.mean((force - ideal) ** 2) / np.mean(ideal**2)))
         assert arrays["mean_force_n"][:, 6].mean() == pytest.approx(ideal.mean(), rel=0.03)
@@ -68,7 +68,7 @@ def test_a_crank_turns_as_in_its_file_and_curves_are_by_its_angle():
     settings = PLACE | few | {"clearance_m": 1.0e-6}
     assert ensemble(leg, settings)[0].speed_rpm == -60.0
     arrays = run_ensemble(leg, settings)
-    force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
+    force = arrays["example_contact_force_n"][:, 0]
     off = [np.square(one - arrays["ideal_joint_force_n"][:, 6]).mean() for one in (force, force[::-1])]
     assert off[0] < 0.1 * off[1]
 
@@ -110,7 +110,7 @@ def test_a_fine_curve_reaches_the_largest_torque():
     leg.stepper.advance(drive, 0.02, new_run_statistics(10))
     begin, errors = round(leg.stepper.time * turn), []
     for i in range(begin, begin + turn // 8):
-        errors.append(abs(leg.observe().torque - leg.stepper.work.now.torque_0[0]))
+        errors.append(abs(leg.observe().drive_torque - leg.stepper.work.now.torque_0[0]))
         leg.stepper.advance(drive, (i + 1) / turn, statistics)
     assert statistics.impacts.sum() > 0
     assert 0.99 < max(errors) / statistics.response[TORQUE_ERROR] < 1.001
@@ -124,12 +124,10 @@ def test_toe_moves_as_its_deviations_say(response):
     assert np.quantile(np.abs(slope - rate[1:-1]), 0.8) < 0.05 * np.abs(rate).max()
 
 
-def test_a_contact_force_pushes_the_pin_towards_the_middle(response):
+def test_a_contact_force_acts_where_the_pin_touches(response):
     force, e = response["example_contact_force_n"][:, 0], response["example_eccentricity_m"][:, 0]
-    touching = np.linalg.norm(force, axis=1) > 1.0
-    inwards = -(force * e).sum(axis=1)[touching]
+    touching = force > 1.0
     assert touching.any()
-    assert (inwards > 0.0).all()
     assert np.linalg.norm(e[touching], axis=1).min() > 2.9e-4
     assert np.linalg.norm(e[~touching], axis=1).max() < 3.1e-4
 

@@ -23,8 +23,6 @@ from leg_wear_monitor.dynamics.clearance.basis import (
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
-    NX,
-    NY,
     V0,
     contact_laws,
     have_usual_laws,
@@ -69,27 +67,6 @@ STATISTICS_INTERVALS = 1024
 _MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
-
-
-class Moment(NamedTuple):
-    """The leg at one instant, with k clearance joints, in the ground's frame.
-
-    ``deviation`` (3, 2): of the toe from the ideal linkage, position [m], velocity [m/s], acceleration
-    [m/s^2];
-    ``torque``: of the drive [N m]; ``e`` [m], ``rate`` [m/s] (k, 2): eccentricities and their rates;
-    ``force`` (k, 2) [N]: of the bushing on the journal; ``reaction`` (r,): drive torque [N m], then the two
-    components of the force in each ideal joint [N]; ``toe`` (2,) [m]: position, zeros without a toe;
-    ``elastic_energy``: of the contacts [J].
-    """
-
-    deviation: Floats
-    torque: float
-    e: Floats
-    rate: Floats
-    force: Floats
-    reaction: Floats
-    toe: Floats
-    elastic_energy: float
 
 
 class Snapshot(NamedTuple):
@@ -179,17 +156,6 @@ class ClearanceStepper:
         sample = self._sample()
         return np.asarray(np.hypot(sample[F_N], sample[F_T]))
 
-    def _forces(self) -> Floats:
-        """Contact forces (k, 2) [N] on the journals at that sample."""
-        sample = self._sample()
-        nx, ny = sample[NX], sample[NY]
-        return np.stack([-sample[F_N] * nx - sample[F_T] * ny, -sample[F_N] * ny + sample[F_T] * nx], axis=1)
-
-    @property
-    def contact(self) -> Floats:
-        """A copy of the last sample before that time: rows of `dynamics.joint` (SAMPLE, k)."""
-        return self._sample()[:SAMPLE].copy()
-
     def _sample(self) -> Floats:
         """The last sample before that time (SAMPLE_ROWS, k)."""
         return self.work.start[:, : len(self.state.approach)]
@@ -208,19 +174,24 @@ class ClearanceStepper:
         names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
         return np.asarray(names == name)
 
-    def observe(self) -> Moment:
+    def observe(self) -> Sample:
         """The leg at that time; does not change the state."""
-        work, state, energy = self.work, self.state, self.elastic_energy()
-        x, now = work.x[:, : len(state.e)], work.now
-        return Moment(
-            deviation=_toe_deviations(now.toe, now.speed[0], x[E0], x[V0], x[A0]),
-            torque=float(work.reaction[0]),
-            e=self.eccentricity,
-            rate=state.v.reshape(-1, 2).copy(),
-            force=self._forces(),
-            reaction=work.reaction[: len(self.model.tables.reaction_joint)].copy(),
-            toe=work.toe.copy(),
-            elastic_energy=energy,
+        self.elastic_energy()
+        work, state, joints, tables = self.work, self.state, self.model.contacts.joint, self.model.tables
+        x, now, reaction = work.x[:, : len(state.e)], work.now, work.reaction[: len(tables.reaction_joint)]
+        force = np.zeros(len(self._setup.linkage.mechanism.joints))
+        force[joints] = self.last_force
+        np.add.at(force, tables.reaction_joint[1:], reaction[1:] ** 2)
+        ideal = tables.reaction_joint[1::2]
+        force[ideal] = np.sqrt(force[ideal])
+        return Sample(
+            self.crank_angle,
+            _toe_deviations(now.toe, now.speed[0], x[E0], x[V0], x[A0]),
+            float(reaction[0]),
+            force,
+            self._sample()[:SAMPLE].copy(),
+            state.approach > 0.0,
+            state.depth[:, BUSHING].max(axis=1),
         )
 
     def elastic_energy(self) -> float:
@@ -365,22 +336,7 @@ class ClearanceRun:
 
     def sample(self) -> Sample:
         """The present state of the leg."""
-        moment, tables, contacts = self.stepper.observe(), self.stepper.model.tables, self._setup.contacts
-        force = np.zeros(len(self._setup.linkage.mechanism.joints))
-        force[contacts.joint] = self.stepper.last_force
-        np.add.at(force, tables.reaction_joint[1:], moment.reaction[1:] ** 2)
-        ideal = tables.reaction_joint[1::2]
-        force[ideal] = np.sqrt(force[ideal])
-        stepper = self.stepper
-        return Sample(
-            stepper.crank_angle,
-            moment.deviation,
-            moment.torque,
-            force,
-            stepper.contact,
-            stepper.state.approach > 0.0,
-            stepper.state.depth[:, BUSHING].max(axis=1),
-        )
+        return self.stepper.observe()
 
 
 # Compilation of the motion before any leg is there: types of arguments do not depend on the mechanism.

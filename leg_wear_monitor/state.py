@@ -346,7 +346,7 @@ class LegAlarm:
     level : Level
         Level that is shown; a latched alarm keeps its highest one.
     state : str
-        Whether it is present or latched, and acknowledged.
+        Present or latched, and acknowledged or not.
     value : float or None
         Last value, in ``unit``.
     limit : float or None

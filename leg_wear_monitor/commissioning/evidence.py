@@ -44,7 +44,7 @@ _ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which the 
 
 
 def separates_lag(pair: Pair) -> bool:
-    """Whether the crank walks at speeds different enough to tell a lag from an offset.
+    """True if the crank walks at speeds different enough to tell a lag from an offset.
 
     In one recording: each has an offset of its own, as its encoder may have started anew.
     """
@@ -65,7 +65,7 @@ class Timing:
     lag_s, sigma_s : float
         Whole lag to allow for, and its standard deviation [s].
     is_declared : bool
-        Whether the drive's lag is declared.
+        True if the drive's lag is declared.
     """
 
     late_s: float
@@ -76,7 +76,7 @@ class Timing:
 
     @property
     def is_separated(self) -> bool:
-        """Whether the recording tells a lag from an offset."""
+        """True if the recording tells a lag from an offset."""
         return math.isfinite(self.late_s)
 
 
@@ -88,7 +88,7 @@ def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared: DriveF
     one : Fit
     sampling : str
     is_sampling_known : bool
-        Whether the recording shows the sampling.
+        True if the recording shows the sampling.
     declared : DriveFigures
         Declared lag and low-pass of the drive.
     """

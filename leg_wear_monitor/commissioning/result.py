@@ -124,7 +124,7 @@ class CommissioningResult:
 
     @property
     def is_sure(self) -> bool:
-        """Whether every parameter was determined, and everything fits."""
+        """True if every parameter was determined, and everything fits."""
         return self.config is not None and not self.not_told and not self.findings
 
     def item(self, name: str) -> CommissioningItem:

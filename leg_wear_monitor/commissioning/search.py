@@ -172,14 +172,14 @@ def on_one_shaft(one: Fit, other: Fit) -> bool:
 
 
 def same_gear(one: Fit, other: Fit) -> bool:
-    """Whether two fits have about the same gear ratio."""
+    """True if two fits have about the same gear ratio."""
     return abs(one.gear_ratio / other.gear_ratio - 1.0) < SAME_GEAR
 
 
 # The best candidate, its rival in each respect, and whether the rival may be the truth.
 
 
-_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, sensors of two legs by more
+_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ only by their lags; sensors of two legs differ more
 _SIGNALS = ("crank_joint", "drive_torque.source")
 _ANOTHER_LEG = 0.5  # repeating residual beyond which no known leg fits
 

@@ -38,7 +38,7 @@ class Cause(Enum):
     SEVERAL = "clearances of several joints", "CLEARANCE_CHANGED"
     SIGN = "sign of the torque sensor", "TORQUE_SIGN"
     SCALE = "scale of the torque sensor", "TORQUE_SCALE"
-    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
+    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # one speed cannot distinguish the two
     CRANK_OFFSET = "offset of the crank encoder", "TORQUE_TIMING"
     LAG = "lag of the torque sensor", "TORQUE_TIMING"
     NOISE = "noise of the torque sensor", "TORQUE_NOISE"
@@ -101,7 +101,7 @@ class Change(NamedCause):
     runner_up_log_odds : float
         Natural logarithm of the odds against the runner-up.
     is_corrected : bool
-        Whether this change corrected the modelled clearance.
+        True if this change corrected the modelled clearance.
     """
 
     since_ns: int
@@ -113,17 +113,17 @@ class Change(NamedCause):
 
     @property
     def is_named(self) -> bool:
-        """Whether no other explanation is nearly as good."""
+        """True if no other explanation is nearly as good."""
         return self.runner_up_log_odds >= SURE_OF_NAME
 
     @property
     def is_sure(self) -> bool:
-        """Whether a clearance has changed, much more probably than anything else."""
+        """True if a clearance has changed, much more probably than anything else."""
         return self.cause is Cause.CLEARANCE and self.log_odds >= SURE_LOG_ODDS and self.is_named
 
     @property
     def is_wide(self) -> bool:
-        """Whether a clearance is so much wider than modelled that the monitor corrects it."""
+        """True if a clearance is so much wider than modelled that the monitor corrects it."""
         return self.cause is Cause.CLEARANCE and self.value >= CORRECTED_FROM * self.counted
 
 
@@ -160,7 +160,7 @@ class TorqueExplanation:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the torque counts as predicted with the first alternative."""
+        """True if the torque counts as predicted with the first alternative."""
         return self.after <= self.limit
 
     @property
@@ -172,12 +172,12 @@ class TorqueExplanation:
 
     @property
     def is_input_fault(self) -> bool:
-        """Whether the torque or the crank angle is wrong as received."""
+        """True if the torque or the crank angle is wrong as received."""
         return bool(self._possible) and all(any(map(_is_of_input, each)) for each in self._possible)
 
     @property
     def hides_leg(self) -> bool:
-        """Whether the received torque tells nothing about the leg.
+        """True if the received torque tells nothing about the leg.
 
         A delay or an offset of the crank does not hide it, because the diagnosis estimates them with the leg.
         """
@@ -189,7 +189,7 @@ class TorqueExplanation:
         return self.alternatives if self.is_whole else (self.named,)
 
     def _is_timing(self, causes: tuple[NamedCause, ...]) -> bool:
-        """Whether only the time of the torque is wrong as received, by a delay that is estimated."""
+        """True if only the time of the torque is wrong as received, by a delay that is estimated."""
         wrong = [one for one in causes if _is_of_input(one)]
         by_angle = (one.value for one in wrong if one.cause in (Cause.TIMING, Cause.CRANK_OFFSET))
         late_s = sum(one.value for one in wrong if one.cause is Cause.LAG) - sum(by_angle) / self.speed_radps

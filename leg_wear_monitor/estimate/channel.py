@@ -268,7 +268,7 @@ def _best_channel(
     time_constants_s : sequence of float
         Of the low-passes to try; without 0, a low-pass is declared.
     first_order : bool
-        Whether no others are tried: impacts tell them apart, of clearances as they are.
+        True if no others are tried: impacts tell them apart, of clearances as they are.
     """
 
     def fit_of(near: Channel) -> ChannelFit:

@@ -41,11 +41,11 @@ class ClearanceFit:
 
     @property
     def explains(self) -> bool:
-        """Whether the clearances explain the measured signature."""
+        """True if the clearances explain the measured signature."""
         return self.square <= _EXPLAINED
 
     def agrees(self, k: int, change: Change) -> bool:
-        """Whether the fit of all clearances gives joint k the same size as a change of joint k alone."""
+        """True if the fit of all clearances gives joint k the same size as a change of joint k alone."""
         return bool(abs(self.clearance_m[k] - change.value) <= SURE_SIGMAS * change.sigma)
 
 

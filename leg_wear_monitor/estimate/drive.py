@@ -41,12 +41,12 @@ class Channel:
 
     @property
     def low_pass_s(self) -> float:
-        """Time by which slow changes of the torque are late by the low-pass, or by the averaging."""
+        """Delay of slow changes of the torque by the low-pass or the averaging [s]."""
         return self.time_constant_s + 0.5 * self.mean_s
 
     @property
     def lateness_s(self) -> float:
-        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
+        """Delay of slow changes of the torque by delay and low-pass together [s]."""
         return self.delay_s + self.low_pass_s
 
     @property
@@ -130,12 +130,12 @@ class DriveFigures:
 
     @property
     def declared(self) -> dict[str, float]:
-        """The figures that are declared, by name."""
+        """Declared values by name."""
         return {name: value for name, value in attrs.asdict(self).items() if not math.isnan(value)}
 
     @property
     def lateness_s(self) -> float:
-        """Declared time by which slow changes of the torque are late: by the lag and by the low-pass."""
+        """Declared delay of slow changes of the torque, by lag and low-pass together [s]."""
         parts = (self.lag_s, 1.0 / (2.0 * math.pi * self.bandwidth_hz))
         return sum(one for one in parts if not math.isnan(one))
 

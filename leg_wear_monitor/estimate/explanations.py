@@ -197,7 +197,7 @@ class Explanation(NamedCause):
     square: float
 
     def explains(self, without: float) -> bool:
-        """Whether a leg can have this cause, and whether it explains the measured signature.
+        """True if a leg can have this cause and it explains the measured signature.
 
         Parameters
         ----------
@@ -644,7 +644,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
 
 
 def _is_rival(one: Explanation, best: Explanation) -> bool:
-    """Whether an explanation contradicts the best one; a second open joint only adds to the first."""
+    """True if an explanation contradicts the best one; a second open joint only adds to the first."""
     if one.cause is Cause.SEVERAL and best.cause is Cause.CLEARANCE:
         return False
     return (one.cause.fault_code, one.subject) != (best.cause.fault_code, best.subject)

@@ -95,7 +95,7 @@ class GroundLoad:
 
     @property
     def is_sure(self) -> bool:
-        """Whether the foot carries a load, and not only masses, friction or scatter."""
+        """True if the foot carries a load, and not only masses, friction or scatter."""
         is_seen = self.peak_n > max(_SURE * self.peak_sigma_n, _LEAST_N)
         return is_seen and self.without > _WORSE * max(self.square, 1.0)
 

@@ -77,9 +77,9 @@ class JointMotion:
         Smoothed; the position counts on over turns.
     recording : (n,) array of int
     near : (n,) array of bool
-        Whether the time is not in a gap between samples.
+        True if the time is not in a gap between samples.
     is_wrapped : bool
-        Whether the encoder's readings are wrapped to a turn.
+        True if the encoder's readings are wrapped to a turn.
     noise_rad : float
         Standard deviation of the readings about the smoothed position [rad].
     first_rad : (recordings,) array
@@ -164,7 +164,7 @@ def _window(time_s: Floats) -> tuple[float, int]:
 
 
 def is_wrapped(value: Floats) -> bool:
-    """Whether readings (n,) [rad] jump by about a turn and stay within one turn, apart from noise."""
+    """True if readings (n,) [rad] jump by about a turn and stay within one turn, apart from noise."""
     jumps = np.abs(np.diff(value)) > math.pi
     return bool(jumps.any() and np.ptp(value) <= 1.05 * TURN)
 
@@ -199,7 +199,7 @@ def _smoothed(
     time_s, position, speed, acceleration : (m,) arrays
         At even steps, half a window inside the first and the last sample [s, rad, rad/s, rad/s^2].
     near : (m,) array of bool
-        Whether the time is not in a gap between samples.
+        True if the time is not in a gap between samples.
     noise : float
         Standard deviation of the samples about the smoothed position [rad].
     """
@@ -277,7 +277,7 @@ class Pair:
 
     @property
     def walks_both_ways(self) -> bool:
-        """Whether each direction has at least a tenth of the samples."""
+        """True if each direction has at least a tenth of the samples."""
         backwards = float(np.mean(self.speed_radps < 0.0))
         return 0.1 < backwards < 0.9
 
@@ -342,7 +342,7 @@ def slow_speed(pair: Pair, span_s: float = _SLOW_S) -> Floats:
 
 
 def is_steady(pair: Pair) -> NDArray[np.bool_]:
-    """Whether (n,) the speed without its ripple is about the same half a second before and after a sample."""
+    """True (n,) where the speed without ripple is about the same half a second before and after a sample."""
     speed, at = slow_speed(pair), np.arange(len(pair.time_s))
     half = round(0.5 * _SLOW_S / max(pair.interval_s, 1.0e-6))
     before, after = np.maximum(at - half, 0), np.minimum(at + half, len(at) - 1)

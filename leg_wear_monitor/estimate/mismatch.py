@@ -171,7 +171,7 @@ class Hypothesis:
     sign : int
         -1 if the sign is reversed.
     is_scaled, is_turned, is_loaded : bool
-        Whether the factor differs from 1, the crank angle by more than a usual lag, and the foot load is out
+        True if the factor differs from 1, the crank angle by more than a usual lag, and the foot load is out
         of its bounds.
     body : str
         Body whose mass differs from the mechanism file; empty for none.
@@ -201,7 +201,7 @@ class Fit:
     unexplained : float
         RMS of the residual, as a fraction of the RMS of the scaled prediction.
     free : tuple of bool
-        Whether each of the four values is neither fixed nor at a bound.
+        True if each of the four values is neither fixed nor at a bound.
     """
 
     hypothesis: Hypothesis

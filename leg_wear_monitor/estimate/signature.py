@@ -36,7 +36,7 @@ class TorqueSensor:
     size_nm : float
         RMS of the leg's drive torque.
     is_instant : bool
-        Whether a sample is the torque at its instant, or else the mean since the one before.
+        True if a sample is the torque at its instant; False if it is the mean since the previous sample.
     noise_nm : float
         Standard deviation of a sample.
     channel : Channel
@@ -621,7 +621,7 @@ class CommissionedTorque:
         Baseline before a correction: difference between signatures and the model's signatures. The other
         joints are still to be compared with it.
     is_interim : bool
-        Whether the leg has a lasting change, so that this is no baseline.
+        True if the leg has a lasting change, so that this is no baseline.
     """
 
     stamp_ns: int
@@ -643,12 +643,12 @@ class CommissionedTorque:
 
     @property
     def is_as_modelled(self) -> bool:
-        """Whether the clearances were modelled, not corrected."""
+        """True if the clearances were modelled, not corrected."""
         return not self.sigma_m.any()
 
     @property
     def is_unknown(self) -> Flags:
-        """Whether each clearance (k,) is unknown: a correction elsewhere may hide its opening."""
+        """True if each clearance (k,) is unknown: a correction elsewhere may hide its opening."""
         return np.asarray(self.sigma_m >= self.clearance_m)
 
     @property
@@ -662,7 +662,7 @@ class CommissionedTorque:
         return attrs.evolve(self, period_s=period_s, together=together, is_instant=is_instant)
 
     def is_of(self, sensor: TorqueSensor) -> bool:
-        """Whether a sensor measured the torque in the same way; if unknown, in as many phases."""
+        """True if a sensor measured the torque in the same way; if unknown, in as many phases."""
         own = self.period_s, self.together, self.is_instant
         is_same = own == (sensor.period_s, sensor.together, sensor.is_instant)
         return (is_same or math.isnan(self.period_s)) and self.signatures.shape[1] == 2 * sensor.phases

@@ -66,7 +66,7 @@ class Blocks:
         Index of each run's first sample.
     length : (m,) array of int
     kept : (m,) array of bool
-        Whether a run is long enough to be used.
+        True if a run is long enough to be used.
     part : (m,) array of int
         Part of a turn, counted on over turns.
     """
@@ -411,7 +411,7 @@ def _folded(one: Fit, which: Floats) -> Floats:
 
 
 def too_alike(best: Fit, rival: Fit, other_signal: bool = False) -> bool:
-    """Whether a rival is so close to the best fit that the best fit need not be the truth.
+    """True if a rival is so close to the best fit that the best fit need not be the truth.
 
     With another signal, the model errs in the same way for both; else its error may favour the wrong fit.
     """

@@ -88,7 +88,7 @@ def next_point_s(moving_s: float) -> float:
 
 
 class Accounting:
-    """Counts for the ledger, and writes to it when it is time.
+    """Counters for the ledger; writes an entry when it is due.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ class Accounting:
 
     @property
     def is_all_counted(self) -> bool:
-        """Whether there were samples, and the ledger already contained the wear of all of them."""
+        """True if there were samples, and the ledger already contained the wear of all of them."""
         return self.skipped > 0 and not (self.spans or self._past or self._is_anew)
 
     def begin_epoch(self) -> None:
@@ -330,7 +330,7 @@ class Accounting:
             self.ledger.note(event)
 
     def note_alarms(self, change: AlarmList) -> None:
-        """Take down which alarms are shown otherwise than they were."""
+        """Note the alarms whose shown state has changed."""
         shown = {alarm.name: (alarm.level, alarm.acknowledged) for alarm in change.alarms}
         for alarm in change.alarms:
             if shown[alarm.name] != self._shown.get(alarm.name, (Level.OK, False)):
@@ -338,7 +338,7 @@ class Accounting:
         self._shown = shown
 
     def note_clearances(self, report: CycleReport) -> None:
-        """Take the clearances down, now and then."""
+        """Note the clearances for the history from time to time."""
         moving_s = self.totals["moving_s"]
         if moving_s < self._point_due_s:
             return

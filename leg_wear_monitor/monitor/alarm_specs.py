@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # lists the kinds.
 
 
-DEADBAND = 0.05  # of a limit: a value at its limit must not switch the level in each gait cycle
+DEADBAND = 0.05  # fraction of a limit: a value near its limit must not switch the level in each gait cycle
 
 
 @attrs.frozen
@@ -75,13 +75,13 @@ class AlarmSpec:
     limit : callable
         Limit of ERROR.
     is_immediate : bool
-        Whether the level rises in the first gait cycle beyond, without `alarms.on_delay_cycles`.
+        True if the level rises in the first gait cycle beyond, without `alarms.on_delay_cycles`.
     is_least : bool
-        Whether the limit is a lower bound: values below it are faults.
+        True if the limit is a lower bound: values below it are faults.
     is_count : bool
-        Whether the value is a count: ERROR begins at the limit, without WARN and deadband.
+        True if the value is a count: ERROR begins at the limit, without WARN and deadband.
     is_latched : bool
-        Whether the alarm stays until it is acknowledged; the alarm of missing data ends when they return.
+        True if the alarm stays until it is acknowledged; the alarm of missing data ends when they return.
     far : float
         A value beyond so many times a limit raises the level at once.
     figure : Figure or None
@@ -200,8 +200,7 @@ MISMATCH = AlarmSpec(
     "do not explain, as a fraction of the predicted RMS",
     **_parameter("torque_mismatch"),
     # The scatter of impacts at 45 rpm reaches the limit once in some thousand gait cycles, three times in a
-    # row once in 300 000, and 1.3 times the limit at most. A torque that is wrong as received is known at
-    # once
+    # row once in 300 000, and 1.3 times the limit at most. A wrong received torque is known immediately
     far=1.5,
 )
 CADENCE = AlarmSpec(

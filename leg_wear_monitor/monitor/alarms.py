@@ -37,9 +37,9 @@ class Limit:
     on_delay : int
         Gait cycles in a row for which a value must be beyond before the level rises; 1: at once.
     is_least : bool
-        Whether the limits are lower bounds: values below them are faults.
+        True if the limits are lower bounds: values below them are faults.
     is_latched : bool
-        Whether a level that was shown stays until it is acknowledged.
+        True if a level that was shown stays until it is acknowledged.
     far : float
         A value beyond so many times a limit raises the level at once.
     """
@@ -57,17 +57,17 @@ class Limit:
         return attrs.evolve(self, warn=factor * self.warn, error=factor * self.error)
 
     def reaches(self, value: float, level: Level) -> bool:
-        """Whether a value is at the limit of WARN or ERROR, or beyond it."""
+        """True if a value is at the limit of WARN or ERROR, or beyond it."""
         limit = self.error if level is Level.ERROR else self.warn
         return value <= limit if self.is_least else value >= limit
 
     def is_far(self, value: float, level: Level) -> bool:
-        """Whether a value is so far beyond the limit of WARN or ERROR that it raises the level at once."""
+        """True if a value is so far beyond the limit of WARN or ERROR that it raises the level at once."""
         limit = self.error if level is Level.ERROR else self.warn
         return not self.is_least and value > self.far * limit
 
     def leaves(self, value: float, level: Level) -> bool:
-        """Whether a value is back from the limit of WARN or ERROR by more than the deadband."""
+        """True if a value is back from the limit of WARN or ERROR by more than the deadband."""
         limit = self.error if level is Level.ERROR else self.warn
         if self.is_least:
             return value > limit * (1.0 + self.deadband)
@@ -91,7 +91,7 @@ class Alarm:
     level : Level
         Shown level: the highest present level since the last acknowledgement.
     acknowledged : bool
-        Whether an operator has acknowledged it at this level.
+        True if an operator has acknowledged it at this level.
     value : float
         Last evaluated value; NaN before.
     limit : float
@@ -244,7 +244,7 @@ _SHOWN_STATE = attrgetter("level", "present", "acknowledged")
 
 
 def has_changed(before: Alarm, after: Alarm) -> bool:
-    """Whether the state shown to operators has changed: level, presence or acknowledgement."""
+    """True if the state shown to operators has changed: level, presence or acknowledgement."""
     return _SHOWN_STATE(before) != _SHOWN_STATE(after)
 
 

@@ -275,7 +275,7 @@ class ClearanceEstimate:
     departure_m : float
         Estimated minus modelled clearance; NaN unless it is estimated.
     believed : bool
-        Whether the forecast uses it: not if the model gives it a tail probability below 0.135 %.
+        True if the forecast uses it: not if the model gives it a tail probability below 0.135 %.
     """
 
     observation: ClearanceObservation
@@ -286,7 +286,7 @@ class ClearanceEstimate:
 
     @property
     def is_other(self) -> bool:
-        """Whether the clearance differs significantly from the modelled one."""
+        """True if the clearance differs significantly from the modelled one."""
         return abs(self.departure_m) >= max(LEAST_M, SURE_SIGMAS * self.sigma_m)
 
     @property

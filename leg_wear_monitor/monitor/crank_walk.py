@@ -63,7 +63,7 @@ def last_walk(samples: Samples, cadence: Cadence, longest_gap_s: float) -> Walk:
     sound = samples[(samples["fault"] == NO_FAULT) & (samples["stamp_ns"] > 0)]
     origin_ns = int(np.median(sound["stamp_ns"])) if len(sound) else 0
     longest_ns = int(_LONGEST * MOST_TURNS * 60.0e9 / abs(cadence.commanded_rpm))
-    sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # and no stray stamps
+    sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # stray stamps are left out
     crank = _series(sound[sound["kind"] == CRANK], "crank_angle_rad", origin_ns)
     crank = attrs.evolve(crank, value=np.asarray(np.unwrap(crank.value)))
     first, turns, why = _turns(crank, cadence, longest_gap_s)

@@ -1,4 +1,4 @@
-"""Holds samples back until the crank's zero is found, and passes them on with it.
+"""Holds samples back until the crank's zero is found, then passes them on.
 
 An encoder on the motor's shaft starts at zero at each boot. Samples wait while the zero is looked for, and
 follow it: no gait cycle is lost, as long as it is found among the samples that may wait. It is looked for at
@@ -68,14 +68,14 @@ _WRAP = 1.5 * _TURN  # an angle that is wrapped to a turn jumps by less
 
 @kernel
 def _is_counted_on(settings, state):
-    """Whether the angle after a gap is too large for an encoder that restarted in it."""
+    """True if the angle after a gap is too large for an encoder that restarted in it."""
     gap = 1.0e-9 * (state.first_stamp - state.stamp[0])
     return gap > settings.gap and abs(state.first_angle) > settings.largest * gap + _TURN
 
 
 @kernel
 def _belongs(settings, state, k, stamp, angle):
-    """Whether an angle continues series k."""
+    """True if an angle continues series k."""
     guess_speed(settings, state, k, stamp, angle)
     ahead = state.speed[k] * 1.0e-9 * (stamp - state.stamp[k])
     if abs(angle - state.angle[k] - ahead) > _WRAP:
@@ -141,7 +141,7 @@ _MOST_PERIODS = _A_CYCLE * (MOST_TURNS + 4)  # samples wait so long; enough for 
 _MOST_SAMPLES = 400_000  # 30 MB
 _LONGEST_DOUBT = _A_CYCLE  # periods after which an angle that neither continues nor restarts is a new series
 
-_LONGEST_REST = 4 * _A_CYCLE  # periods between attempts, each of which takes a tenth of a second
+_LONGEST_REST = 4 * _A_CYCLE  # periods between attempts, because an attempt takes a tenth of a second
 
 _NONE: Samples = np.zeros(0, GAIT_SAMPLE)
 
@@ -170,7 +170,7 @@ class CrankZeroState:
     doubts : int
         Periods since then.
     has_passed : bool
-        Whether samples were passed on in this run.
+        True if samples were passed on in this run.
     waiting_s : float
         Time of the samples that wait, up to the last period that is over.
     dropped_s, before_s : float
@@ -224,7 +224,7 @@ class CrankZero(Observer):
         ----------
         samples : (n,) array of GAIT_SAMPLE
         ends_period : bool
-            Whether an evaluation period ends with them.
+            True if an evaluation period ends with them.
         """
         out: list[Samples] = []
         stamp, kind, fault = (np.array(samples[name]) for name in ("stamp_ns", "kind", "fault"))
@@ -322,7 +322,7 @@ class CrankZero(Observer):
         """Drop the samples of the first periods; their time is not monitored."""
         state, following = self.state, self.state.waiting[number : number + 1]
         if number:
-            # the step to the first sample that is kept is lost, too
+            # the step to the first kept sample is lost as well
             lost = (*state.waiting[:number], *(part[part["kind"] == CRANK][:1] for part in following))
             state.dropped_s += _duration_s(lost, self._gap_s)
             state.waiting = state.waiting[number:]

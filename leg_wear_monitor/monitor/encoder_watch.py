@@ -104,7 +104,7 @@ class EncoderWatch(Observer):
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
-        """Clearance that is seen of each joint, None where it is not."""
+        """Clearance of each joint estimated from encoders; None if it is not observable."""
         return [
             KnownClearance("encoders", one.clearance_m, one.sigma_m)
             if one.observation is ClearanceObservation.SEEN
@@ -114,7 +114,7 @@ class EncoderWatch(Observer):
 
     @property
     def shows(self) -> str:
-        """Source of the clearances that are seen."""
+        """Source of the estimated clearances."""
         return "encoders"
 
     @property
@@ -149,7 +149,7 @@ class EncoderWatch(Observer):
         return (Status("encoders", level, "; ".join([*wrong, *self._words()]), values, code),)
 
     def _words(self) -> list[str]:
-        """Joints that differ from the modelled ones, or why nothing is seen."""
+        """Joints that differ from the model, or the reason why there is no estimate."""
         if not self.estimates:
             return ["no whole gait cycle yet"]
         each = list(zip(self._leg.clearance_joints, self.estimates, strict=True))

@@ -51,7 +51,7 @@ class EncoderErrors:
         Offset of the crank's encoder, offsets from the centres [rad] and scale errors of the others.
     covariance : array
     known : tuple of bool
-        Whether each encoder is commissioned.
+        True if each encoder is commissioned.
     """
 
     centre_rad: Floats
@@ -184,7 +184,7 @@ class EncoderState:
     due : tuple of (int, int)
         Begin and end [ns] of ended gait cycles that are not evaluated yet.
     present : tuple of bool
-        Whether the cycles of the estimate have each encoder; empty before the first cycle.
+        True if the cycles of the estimate have each encoder; empty before the first cycle.
     changed_present : tuple of bool
         The same of the last cycles, if it differs from `present`; empty otherwise.
     changed_cycles : int
@@ -192,7 +192,7 @@ class EncoderState:
     faults : tuple of str
         Fault of each encoder in the last cycle; empty before the first.
     is_requested : bool
-        Whether a reference was requested since the last change of the leg.
+        True if a reference was requested since the last change of the leg.
     since_reference : int
         Cycles since the last reference was ready.
     profiles : tuple of CrankProfile
@@ -296,7 +296,7 @@ class EncoderObserver(KeepsSamples):
 
     @property
     def commissions(self) -> bool:
-        """Whether the errors of some available encoder are unknown."""
+        """True if the errors of some available encoder are unknown."""
         return any(
             here and not known
             for here, known in zip(self.state.present, self.state.errors.known, strict=False)
@@ -304,7 +304,7 @@ class EncoderObserver(KeepsSamples):
 
     @property
     def has_failed(self) -> bool:
-        """Whether there is no reference because the leg could not be simulated."""
+        """True if there is no reference because the leg could not be simulated."""
         return (
             self.state.is_requested
             and not self._reference.is_busy
@@ -457,7 +457,7 @@ class EncoderObserver(KeepsSamples):
             )
 
     def _is_reference_outdated(self) -> bool:
-        """Whether the estimated clearances or the crank motion have left the reference's."""
+        """True if the estimated clearances or the crank motion have left the reference's."""
         found, reference = self.state.found, self._clearance_regression.reference
         if found is None or reference is None or self.state.since_reference < _LEAST_BETWEEN_REFERENCES:
             return False

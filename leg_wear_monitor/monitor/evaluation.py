@@ -130,7 +130,7 @@ class AlarmBoard:
         return self._set(found, stamp_ns)
 
     def reaches(self, name: str, value: float) -> bool:
-        """Whether a value reaches the limit of WARN of an alarm."""
+        """True if a value reaches the limit of WARN of an alarm."""
         return self._limits[name].reaches(value, Level.WARN)
 
     def _limit(self, name: str, impact_factor: float) -> Limit:
@@ -178,7 +178,7 @@ class AlarmBoard:
     def restore(self, alarms: Iterable[Alarm]) -> None:
         """Restore alarms from another run.
 
-        Alarms of encoders or of a foot load that are not read any more stay until they are acknowledged.
+        Alarms of an encoder or a foot load that is no longer configured stay until they are acknowledged.
         """
         for alarm in alarms:
             is_done = alarm.acknowledged and alarm.name not in self._limits
@@ -198,10 +198,9 @@ class AlarmBoard:
 
 # Evaluation periods: a quarter of the commanded gait cycle each, at whose end alarms are evaluated.
 #
-# They follow from the samples in their order of arrival alone: however those are cut into blocks, the monitor
-# looks at the same instants. A period ends when two samples in a row lie outside of it; one alone may have a
-# stray stamp. It also ends after many samples without a later time, or a stream of such would never be
-# evaluated.
+# They depend only on the order of arrival, so the instants of evaluation do not depend on how samples are cut
+# into blocks. A period ends when two samples in a row lie outside of it; one alone may have a stray stamp. It
+# also ends after many samples without a later time, or a stream of such would never be evaluated.
 
 
 A_CYCLE = 4
@@ -290,7 +289,7 @@ class AlarmEvaluation:
     health : InputHealth or None
         Health of the input at its last evaluation.
     is_late : bool
-        Whether samples may be missing because this program was late, not the sender.
+        True if samples may be missing because this program was late, not the sender.
     """
 
     def __init__(
@@ -325,7 +324,7 @@ class AlarmEvaluation:
         self.board.configure(config)
 
     def is_model_valid(self) -> bool:
-        """Whether the model is valid for the present motion: cadence and torque are as expected."""
+        """True if the model is valid for the present motion: cadence and torque are as expected."""
         return self.board.level(alarm_specs.CADENCE.name(), alarm_specs.MISMATCH.name()) is not Level.ERROR
 
     def add_samples(self, piece: Samples) -> None:
@@ -358,7 +357,7 @@ class AlarmEvaluation:
         observed : mapping of str to float
             Values of the observers, by the names of their alarms.
         is_refused : bool
-            Whether the crank's input has a fault: cadence and forces are then not the leg's.
+            True if the crank's input has a fault: cadence and forces are then not the leg's.
         """
         self._cycles += 1
         values, factor = dict(observed), 1.0
@@ -397,7 +396,7 @@ class AlarmEvaluation:
         skipped : int
             Number of samples skipped so far because their wear is already counted.
         is_refused : bool
-            Whether the crank has an input fault: its cadence and its impacts are not known.
+            True if the crank has an input fault: its cadence and its impacts are not known.
         """
         peaks = {
             alarm_specs.IMPACT.name(joint): float(peak)

@@ -86,7 +86,7 @@ class FootLoadCheck(Observer):
         linkage = build_linkage(mechanism)
         self.is_contact = config.foot_load.source == CONTACT
         self._stance = stance = nominal_stance(linkage)
-        # at the middles of the phases
+        # values at the middle of each phase
         self._expected = stance.force(points=2 * FINE_PHASES)[1::2] @ stance.up
         motion = one_cycle(linkage, 2 * FINE_PHASES, 1.0)
         speed = getattr(mechanism.drive, "speed", TURN)
@@ -151,7 +151,7 @@ class FootLoadCheck(Observer):
         return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
 
     def _freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
-        """Whether the last gait cycle shows a wrong load or none, and whether it has always been wrong.
+        """Two flags: the last gait cycle shows a wrong load or none; the load has always been wrong.
 
         A sensor that got stuck, lost its zero or went silent was right before; any other fault, and noise
         without a load, holds for earlier cycles, too.
@@ -165,7 +165,7 @@ class FootLoadCheck(Observer):
 
     @property
     def acts(self) -> str:
-        """The foot load that acts on the leg, in words."""
+        """Sentence on the foot load that acts on the leg."""
         if not self._load_acts:
             return "the load by the drive torque acts, if there is one"
         if not self._has_mean:
@@ -267,13 +267,13 @@ class FootLoadCheck(Observer):
         return values
 
     def _is_above_noise(self, up: Floats) -> bool:
-        """Whether the mean vertical force (n,) changes within a gait cycle by more than its noise."""
+        """True if the mean vertical force (n,) changes within a gait cycle by more than its noise."""
         cycles = np.array([self._stance.up @ each.force_n for each in self._cycles])
         noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
         return float(up.std()) > _NOISE_SIGMAS * noise
 
     def _is_only_noise(self) -> bool:
-        """Whether the mean vertical force changes within a gait cycle by less than by the noise in swing.
+        """True if the mean vertical force changes within a gait cycle by less than by the noise in swing.
 
         Unlike in `_is_above_noise`, steps that differ or are missed are a load, and one cycle in which the
         sensor failed does not count: most phases are in swing, and most cycles are sound.

@@ -39,7 +39,7 @@ def _unit_words(measured: float, predicted: float) -> str:
 
 def _difference(cycle: CycleReport) -> float:
     """Difference of measured and predicted torque, as a fraction of the predicted one."""
-    if math.isnan(cycle.torque_mismatch):  # as in the first gait cycles: with load, friction and lag
+    if math.isnan(cycle.torque_mismatch):  # explained by load, friction and lag, as in the first gait cycles
         return cycle.residual_torque_rms_nm / cycle.predicted_torque_rms_nm
     return cycle.torque_mismatch
 
@@ -54,7 +54,7 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
         Gives the commanded cadence.
     """
     commanded, found = config.cadence.commanded_rpm, []
-    # in a gait cycle in which the leg stood, it stopped and started, too
+    # a gait cycle with a stop also contains the stopping and starting
     stood = cycle.stamp_ns - cycle.begin_ns > LONGEST * 1.0e9 * cycle.moving_s
     if not (stood or _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST):
         found.append(
@@ -159,7 +159,7 @@ class GaitEvidence:
 # History of a leg's drive torque: its friction at commissioning.
 
 
-COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store their friction as this leg's
+COMMISSIONING_CYCLES = 20  # successive cycles as predicted, which give the friction of this leg
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
 
 
@@ -198,7 +198,7 @@ class TorqueRecord:
         ----------
         report : CycleReport
         is_sound : bool
-            Whether its torque was as predicted.
+            True if its torque was as predicted.
         not_compared : NotCompared or None
             Why it was not compared.
         """

@@ -101,7 +101,7 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
     torque : TorqueRange
         Range of the torques between the two counts.
     is_whole : bool
-        Whether all received samples were counted; otherwise the values over time are unknown.
+        True if all received samples were counted; otherwise the values over time are unknown.
     """
     span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
     is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
@@ -430,7 +430,7 @@ class InputRule:
     why, do : str
         Sentence and remedy, with words in braces.
     needs_motion : bool
-        Whether it can only be seen while the crank turns.
+        True if it can only be seen while the crank turns.
     """
 
     code: str
@@ -641,7 +641,7 @@ class JudgeState:
     before : (n,) array or None
         Torque of the gait cycle before, in equal phases.
     has_refused : bool
-        Whether a gait cycle of this evaluation period was refused.
+        True if a gait cycle of this evaluation period was refused.
     """
 
     pieces: tuple[Samples, ...] = ()
@@ -699,12 +699,12 @@ class InputJudge:
         spikes : int
             Outliers of the torque so far.
         is_withheld : bool
-            Whether the guard withholds samples of the crank: then it names their fault.
+            True if the guard withholds samples of the crank: then it names their fault.
 
         Returns
         -------
         bool
-            Whether a gait cycle was refused in this period.
+            True if a gait cycle was refused in this period.
         """
         state = self.state
         has_refused, state.has_refused = state.has_refused, False
@@ -729,7 +729,7 @@ class InputJudge:
         return has_refused
 
     def end_cycle(self, statistics: CycleStatistics) -> frozenset[int]:
-        """Judge a gait cycle; returns the streams that say nothing of the leg in it."""
+        """Judge a gait cycle; returns the streams that contain no information about the leg in it."""
         state = self.state
         samples = np.concatenate([*state.pieces, *state.now])
         end_ns = statistics.stamp_ns
@@ -743,7 +743,7 @@ class InputJudge:
         return frozenset(kinds | ({TORQUE} if CRANK in kinds else set()))
 
     def _is_strange(self, profile: TorqueProfile) -> bool:
-        """Whether a torque is neither as predicted over the crank angle nor as in the gait cycle before."""
+        """True if a torque resembles neither the prediction nor the previous gait cycle."""
         means, before = _phase_means(profile), self.state.before
         self.state.before = None if means is None else means[0]
         if means is None:

@@ -138,7 +138,7 @@ _STEPS = 3  # fast steps in a row: the jump of an angle that wraps is one
 
 @kernel
 def _are_two(settings, state, stamp, angle):
-    """Whether two series go on side by side, after one more sample."""
+    """True if two series continue side by side after one more sample."""
     for k in range(2):
         guess_speed(settings, state, k, stamp, angle)
     near = distance(settings, state, 0, stamp, angle)
@@ -159,14 +159,14 @@ def _are_two(settings, state, stamp, angle):
     if min(state.number[0], state.number[1]) >= _SERIES and state.switches >= _INTERLEAVED:
         state.two = 1
     if abs(stamp - state.since) > 1.0e9 * settings.alone:
-        # the other series has gone; a new series must show itself again
+        # the other series has ended; a new series must appear again
         state.two, state.number[1 - k], state.switches, state.since = 0, 0, 0, stamp
     return state.two == 1
 
 
 @kernel
 def _is_other_unit(settings, state, stamp, angle):
-    """Whether the angle runs as none of a leg's does, after one more sample."""
+    """True if the angle advances as no leg does, after one more sample."""
     step = stamp - state.anchor
     if state.anchor == 0 or abs(step) > 1.0e9 * settings.gap:
         state.anchor, state.anchor_angle, state.fast = stamp, angle, 0
@@ -178,11 +178,11 @@ def _is_other_unit(settings, state, stamp, angle):
             along = speed * math.copysign(1.0, before)
             is_even = 0.5 * abs(before) < along < 2.0 * abs(before)
             state.fast = state.fast + 1 if is_even else 1
-            if is_even:  # and not the jump of an angle that wraps
+            if is_even:  # but not the jump of a wrapped angle
                 state.plausible, state.fast_speed = 0.0, 0.5 * (state.fast_speed + abs(speed))
         else:
             state.fast = 0
-            # at rest every unit is the same
+            # at rest, the unit has no effect
             if abs(speed) > 0.1 * abs(settings.commanded):
                 state.plausible += h
     if state.fast >= _STEPS:
@@ -200,7 +200,7 @@ _FAR, _FAR_FROM_OTHERS, _MANY, _LEAST_KNOWN = 40.0, 4.0, 0.1, 50
 
 @kernel
 def _is_torque_outlier(settings, state, torque):
-    """Whether a drive torque is far from the ones before it."""
+    """True if a drive torque is far from the previous torques."""
     size = abs(torque)
     known = min(state.torques, _RECENT)
     is_far = not size <= LARGEST_TORQUE
@@ -313,7 +313,7 @@ class InputGuard:
 
     @property
     def torque_outliers(self) -> int:
-        """Number of torques left out because they are far from the others."""
+        """Number of torques that are outliers."""
         return int(self._state.torque_outliers)
 
     @property

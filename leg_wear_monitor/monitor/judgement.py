@@ -52,7 +52,7 @@ def verdict_report(leg: MonitoredLeg, situation: Situation | None = None) -> Ver
 
 
 def update_verdict(leg: MonitoredLeg, situation: Situation | None = None) -> tuple[VerdictReport, ...]:
-    """The verdict if it has changed since the last call; it is then an event, too.
+    """The verdict if it has changed since the last call; the change is then also an event.
 
     To be called where the state does not depend on how the samples are cut into blocks: at the end of an
     evaluation period.
@@ -70,7 +70,7 @@ def update_verdict(leg: MonitoredLeg, situation: Situation | None = None) -> tup
 
 
 def is_forecast_valid(leg: MonitoredLeg, found: Sequence[Verdict]) -> bool:
-    """Whether the leg is in the range of the model, and is the modelled one by some findings."""
+    """True if the leg is in the range of the model and no finding contradicts the model."""
     invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
     return leg.evaluation.is_model_valid() and not invalid
 
@@ -78,7 +78,7 @@ def is_forecast_valid(leg: MonitoredLeg, found: Sequence[Verdict]) -> bool:
 def evaluate_clearances(
     leg: MonitoredLeg, joints: Sequence[JointSituation], stamp_ns: int
 ) -> tuple[AlarmList, ...]:
-    """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""
+    """Compare measured and estimated clearances with their limits; no delay, as they do not scatter."""
     board, values, sources = leg.evaluation.board, {}, {}
     for joint in joints:
         name = alarm_specs.CLEARANCE.name(joint.joint)
@@ -105,7 +105,7 @@ def _alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
 
 
 def _takes_back(shown: KnownClearance, limit_m: float) -> bool:
-    """Whether an estimate below a limit is sure, or has held as long as one beyond it has to."""
+    """True if an estimate below a limit is sure, or has lasted as long as an estimate above it must."""
     is_below = shown.clearance_m < limit_m and math.isfinite(shown.least_m)
     return is_below or is_surely_below(limit_m, shown)
 
@@ -204,7 +204,7 @@ def _other_cadence(leg: MonitoredLeg) -> tuple[str, ...]:
 
 
 def _doubts(leg: MonitoredLeg) -> tuple[str, ...]:
-    """Why the last gait cycle is unlikely to be one of this leg; a torque that is explained is no reason."""
+    """Reason why the last gait cycle does not fit this leg; an explained torque is not a reason."""
     last = leg.last
     if last is None:
         return ()

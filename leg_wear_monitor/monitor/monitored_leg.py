@@ -42,7 +42,7 @@ class MonitoredLeg(CountedLeg):
     happened : Event or None
         The last event of the twin.
     has_ended : bool
-        Whether a gait cycle has ended since the last state of the leg was reported.
+        True if a gait cycle has ended since the last state of the leg was reported.
     """
 
     def __init__(self, mechanism: Mechanism, config: MonitorConfig, ledger: Ledger | None) -> None:

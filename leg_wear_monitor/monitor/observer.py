@@ -67,12 +67,12 @@ class Observer:
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
-        """Clearance that is seen of each joint, None where it is not; empty without any."""
+        """Estimated clearance of each joint, None if it is not observable; empty without estimates."""
         return ()
 
     @property
     def shows(self) -> str:
-        """Source of the clearances that are seen now; empty without any."""
+        """Source of the present estimates; empty without estimates."""
         return ""
 
     @property

@@ -180,7 +180,7 @@ def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ..
 
 
 def _eased(was: Alarm, now: Alarm) -> str:
-    """Effect of a measurement on an alarm that an earlier measurement raised, in words; empty for others."""
+    """Sentence on an earlier measurement's alarm that this measurement ends; empty without one."""
     if was.cause not in (MEASURED, BOTH):
         return ""
     if now.level < was.level:
@@ -281,7 +281,7 @@ def _compare(leg: MonitoredLeg, joint: str, stamp_ns: int) -> bool:
 
 
 def _ends(joint: JointSituation, alarm: Alarm) -> bool:
-    """Whether the last measurement of a joint contradicts the basis of the alarm of its clearance."""
+    """True if the last measurement of a joint contradicts the basis of the alarm of its clearance."""
     if joint.measured is None or alarm.cause in ("", COUNTED) or alarm.level is Level.OK:
         return False
     if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:

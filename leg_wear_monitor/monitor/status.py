@@ -69,7 +69,7 @@ def statuses(leg: MonitoredLeg, report: VerdictReport) -> tuple[Status, ...]:
 
 
 def verdict_status(verdict: Verdict) -> Status:
-    """The verdict: its severity, since when it holds, joints and figures concerned as 1, and its evidence."""
+    """The verdict: severity, start, a 1 for each joint and kind of value concerned, evidence."""
     values = {"severity": float(verdict.state.severity), "since_s": verdict.since_ns / 1e9}
     values |= {f"joint_{joint}": 1.0 for joint in verdict.joints}
     values |= {f"not_valid_{figure.value}": 1.0 for figure in verdict.not_valid}
@@ -81,7 +81,7 @@ def verdict_status(verdict: Verdict) -> Status:
 
 
 def _gait(leg: MonitoredLeg) -> Status:
-    """Whether the crank is tracked, the cadence, and the totals of all walking."""
+    """True if the crank is tracked, the cadence, and the totals of all walking."""
     tracking, event, last = leg.twin.tracking, leg.happened, leg.last
     cadence = leg.evaluation.board.alarms[alarm_specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
@@ -233,7 +233,7 @@ def alarms_status(alarms: Iterable[Alarm]) -> Status:
 
 
 def _ledger(accounting: Accounting) -> Status:
-    """Whether the wear is kept on the disk; ``not_kept_s``: walking that is not yet."""
+    """True if the wear is kept on the disk; ``not_kept_s``: walking that is not yet."""
     ledger = accounting.ledger
     if ledger is None:
         return Status("ledger", Level.OK, "no ledger: wear is lost at the end", {})

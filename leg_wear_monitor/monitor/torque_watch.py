@@ -252,7 +252,7 @@ class TorqueWatch(Observer):
 
     @property
     def shows(self) -> str:
-        """Source of the clearances that are seen now."""
+        """Source of the present estimates."""
         return "" if self.observer is None or self.is_wrong else "torque"
 
     # Present state of the torque.
@@ -332,13 +332,13 @@ class TorqueWatch(Observer):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the received drive torque is so wrong that it shows nothing of the leg."""
+        """True if the received drive torque is too wrong to show anything about the leg."""
         explained = self.mismatch.explanation
         return explained is not None and explained.hides_leg
 
     @property
     def has_input_fault(self) -> bool:
-        """Whether a wrong received drive torque or crank angle explains a torque residual."""
+        """True if a wrong received drive torque or crank angle explains a torque residual."""
         explained = self.mismatch.explanation
         return explained is not None and explained.is_input_fault
 

@@ -86,7 +86,7 @@ class WearMonitor:
     clearance_joints : tuple of str
         The clearance joints, in the order of all values.
     reports_states : bool
-        Whether `update` reports the state of the leg, which takes 0.3 ms per report.
+        True if `update` reports the state of the leg, which takes 0.3 ms per report.
 
     Raises
     ------
@@ -191,7 +191,7 @@ class WearMonitor:
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
 
     def _believed(self, piece: Samples, ends_period: bool) -> Samples:
-        """Accepted samples: not counted before, of one source, with a known zero of the crank."""
+        """Accepted samples: new, from one source, with a known zero of the crank."""
         piece = self._leg.guard.checked(self._accounting.not_counted(piece))
         for observer in self._leg.observers:
             piece = observer.passed(piece, ends_period)
@@ -473,7 +473,7 @@ class WearMonitor:
         stamp_ns : int
         who : str
         accept : bool
-            Whether the measurement counts even if it contradicts the model.
+            True if the measurement counts even if it contradicts the model.
 
         Raises
         ------
@@ -584,13 +584,13 @@ class WearMonitor:
 
     @property
     def has_ledger_entry(self) -> bool:
-        """Whether the ledger had wear of this leg when it was opened."""
+        """True if the ledger had wear of this leg when it was opened."""
         ledger = self._accounting.ledger
         return ledger is not None and ledger.entry is not None
 
     @property
     def is_all_counted(self) -> bool:
-        """Whether there were samples, and the ledger already contained the wear of all of them."""
+        """True if there were samples, and the ledger already contained the wear of all of them."""
         return self._accounting.is_all_counted
 
     @property
@@ -599,7 +599,7 @@ class WearMonitor:
         return self._accounting.skipped_s
 
 
-# A monitor with the ledger that its parameters name, from the one to the other without a gap.
+# A monitor with the ledger in its parameters.
 
 
 def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> WearMonitor:
@@ -613,7 +613,7 @@ def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fal
     mechanism : Mechanism
     config : MonitorConfig
     at_end : bool
-        Whether the ledger is written at the end of the run alone, see `open_ledger`.
+        True if the ledger is written at the end of the run alone, see `open_ledger`.
 
     Raises
     ------

@@ -118,7 +118,7 @@ def update(h, step, angle, velocity, trusted, estimate, row):
     Returns
     -------
     used, verdict
-        Whether the sample passed its gate (otherwise the filter contains the prediction); 1 for a velocity
+        True if the sample passed its gate (otherwise the filter contains the prediction); 1 for a velocity
         that agrees with the angles, -1 for one that does not, 0 without velocity.
     """
     predict(h, estimate)

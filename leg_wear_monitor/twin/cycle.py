@@ -369,7 +369,7 @@ def behind_low_pass(signature: Floats, phases: int, cutoff: float, speed: float,
     speed : float
         Of the crank [rad/s].
     is_late : bool
-        Whether the filter has its delay, as for instants, or none, as for averages.
+        True if the filter has its delay, as for instants; False for averages.
     """
     order = np.arange(len(signature) // 2 + 1)
     response = 1.0 / (1.0 + 1j * order * speed / cutoff) ** 2

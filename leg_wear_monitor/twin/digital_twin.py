@@ -261,12 +261,12 @@ class DigitalTwin:
         is_frozen : bool
             False to take samples again.
         clears : bool, optional
-            Whether the load of the gait cycles before was wrong as well: then none acts.
+            True if the load of the gait cycles before was wrong as well: then none acts.
 
         Returns
         -------
         bool
-            Whether a mean load of gait cycles is known.
+            True if a mean load of gait cycles is known.
         """
         rows = self._load.rows
         if clears:

@@ -108,7 +108,7 @@ class FootLoad:
     linkage : Linkage
     contacts : ContactArrays
     is_measured, is_of_foot : bool
-        Whether a measured force acts, and whether its axes are fixed to the foot.
+        True if a measured force acts, and whether its axes are fixed to the foot.
 
     Attributes
     ----------

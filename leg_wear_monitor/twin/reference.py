@@ -375,7 +375,7 @@ class LegSimulation:
             Gait cycles before those that count.
         cycles : int
         wanted : callable
-            Whether to go on, asked after each gait cycle; may be called in any thread.
+            Returns True to continue; called after each gait cycle; may be called in any thread.
 
         Returns
         -------

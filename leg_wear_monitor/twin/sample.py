@@ -193,7 +193,7 @@ class TwinSettings:
     wear_acceleration : float
         Factor on all wear coefficients, for demonstrations; 1 for the material's coefficients.
     estimate_load : bool
-        Whether the estimated foot load acts on the model; it is estimated in any case.
+        True if the estimated foot load acts on the model; it is estimated in any case.
     load_source, load_frame : str
         Source of the foot load samples, or ``none``; axes of the samples.
     load_model : str

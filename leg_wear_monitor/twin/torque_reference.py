@@ -80,12 +80,12 @@ class TorqueReference:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all legs are simulated: a part of a reference has the torques of the first ones."""
+        """True if all legs are simulated: a part of a reference has the torques of the first ones."""
         return len(self.torque_nm) == len(self.clearance_m)
 
     @property
     def is_of_parameters(self) -> bool:
-        """Whether its legs differ from the first leg in masses, lengths and friction."""
+        """True if its legs differ from the first leg in masses, lengths and friction."""
         return bool((self.clearance_m == self.clearance_m[0]).all())
 
     @property
@@ -165,7 +165,7 @@ class ReferenceRun(Generic[FoundT]):
     Attributes
     ----------
     may_be_late : bool
-        Whether `advance` never waits, since the leg walks on meanwhile: a simulation that is not ready in
+        True if `advance` never waits, since the leg walks on meanwhile: a simulation that is not ready in
         time then comes later.
     """
 

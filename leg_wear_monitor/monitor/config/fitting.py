@@ -36,7 +36,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         a mechanism with a torque as its drive, a drive that is not known, a person on bodies that are not
         there, or a load on a mechanism without a toe.
     """
-    drive_figures(config.drive, source)  # a fault of it stops the start, even if the values are not used
+    drive_figures(config.drive, source)  # an error in it prevents the start, even if its values are not used
     interface, torque = config.drive.temperature_interface, config.drive_torque.source
     if interface and torque != INTERFACE:
         fault = f"{interface!r} needs drive_torque.source {INTERFACE!r}, which is {torque!r}"
@@ -82,7 +82,7 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
     for joint, limit in zip(clearance_joints, each, strict=True):
         clearance = mechanism.clearances[joint]
         fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
-        # a limit below the new clearance needs no check: it raises its alarm at once
+        # a limit below the new clearance needs no check, because its alarm rises immediately
         if fault and limit > clearance.radial_clearance:
             raise ConfigError(source, key, fault)
 

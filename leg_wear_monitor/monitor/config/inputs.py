@@ -44,7 +44,7 @@ def _sign(doc: str) -> Any:
 
 @attrs.frozen(kw_only=True)
 class Crank:
-    """From a joint's position to the mechanism's crank angle: sign * position / gear_ratio + offset."""
+    """Conversion of a joint's position to the crank angle: sign * position / gear_ratio + offset."""
 
     sign: int = _sign("1 if the joint turns in the direction of the mechanism's crank angle, otherwise -1")
     offset_rad: float = quantity(
@@ -126,7 +126,7 @@ class Encoders:
 
 @attrs.frozen(kw_only=True)
 class DriveTorque:
-    """From a torque message to the torque on the crank: sign * scale * gear_ratio * value."""
+    """Conversion of a torque message to the torque on the crank: sign * scale * gear_ratio * value."""
 
     source: str = choice(
         TORQUE_SOURCES,
@@ -160,7 +160,7 @@ class DriveTorque:
 
 @attrs.frozen(kw_only=True)
 class FootLoad:
-    """From a message on foot_load to the force of the ground on the toe: sign * scale * value."""
+    """Conversion of a message on foot_load to the force of the ground on the toe: sign * scale * value."""
 
     source: str = choice(
         sample.LOAD_SOURCES,
@@ -223,5 +223,5 @@ class Cadence:
     )
 
     def allows(self, rpm: float) -> bool:
-        """Whether predictions are valid at a cadence [rpm]."""
+        """True if predictions are valid at a cadence [rpm]."""
         return abs(rpm - self.commanded_rpm) <= self.tolerance_rpm

@@ -43,7 +43,7 @@ class Parameter:
         ``""`` where there is none.
     description : str
     read_only : bool
-        Whether it keeps its value from start to end.
+        True if it keeps its value from start to end.
     above, at_least, at_most : float or None
         Bounds of a number, or of each in an array; the first exclusive.
     names : tuple of str
@@ -101,7 +101,7 @@ PARAMETERS: Mapping[str, Parameter] = parameters_of(MonitorConfig)
 
 
 def is_of_node(name: str) -> bool:
-    """Whether a node has the parameter. Parameters of tables are for recordings only."""
+    """True if a node has the parameter. Parameters of tables are for recordings only."""
     return not name.startswith("table.")
 
 
@@ -245,7 +245,7 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
 
 
 def is_parameter_file(document: Any) -> bool:
-    """Whether the content of a YAML file is ROS parameters, or ROS parameters with a misspelt mark."""
+    """True if the content of a YAML file is ROS parameters, or ROS parameters with a misspelt mark."""
     return bool(_misspelt(document)) or any(_is_marked(entry) for _, entry in _sections(document))
 
 
@@ -276,7 +276,7 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
 
 
 def monitors_of(document: Any) -> tuple[str, ...]:
-    """Full names of the monitors that sections of a parameter file are for, and no others."""
+    """Full names of the monitors that have their own section in a parameter file."""
     names = (name for name, _ in _sections(document))
     return tuple(dict.fromkeys(name for name in names if name.endswith(NODE) and "*" not in name))
 
@@ -323,7 +323,7 @@ def _misspelt(document: Any) -> str:
 
 
 def _sections(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Sections by full name; ROS takes names of namespaces and nodes that are nested, too."""
+    """Sections by full name; ROS accepts nested names of namespaces and nodes as well."""
     for key, entry in document.items() if isinstance(document, dict) else ():
         name = f"{prefix}/{str(key).strip('/')}"
         if isinstance(entry, dict) and entry and MARK not in entry:
@@ -333,7 +333,7 @@ def _sections(document: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _is_for(pattern: str, node: str) -> bool:
-    """Whether a section is for a node: ``*`` stands for one name, ``**`` for any number of them."""
+    """True if a section is for a node: ``*`` stands for one name, ``**`` for any number of them."""
     expression = re.escape("/" + pattern.strip("/"))
     expression = expression.replace(r"/\*\*", "(/[^/]+)*").replace(r"\*", "[^/]+")
     return re.fullmatch(expression, node) is not None

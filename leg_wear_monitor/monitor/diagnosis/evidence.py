@@ -79,7 +79,7 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Change | None:
 
 
 def _is_alone(state: TorqueState, change: Change, joint: int) -> bool:
-    """Whether only this joint changed, and not two joints that look like one wider joint.
+    """True if only this joint changed, and not two joints that look like one wider joint.
 
     B and G at 0.50 mm looked like G at 0.83 ± 0.11 mm, G and I like G at 0.84 ± 0.11, where all clearances at
     once had G at 0.47 and 0.54 mm (2026-11-27).
@@ -323,7 +323,7 @@ class Evidence:
         return _LEAST_CYCLES if self._models.fits(state) else _LEAST_CYCLES_UNLIKE
 
     def _fits(self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int) -> bool:
-        """Whether a leg that was never commissioned matches the reference, but for one clearance at most.
+        """True if a leg that was never commissioned matches the reference, but for one clearance at most.
 
         It also matches if it did before a change: a large opening is explained less well.
         """
@@ -463,7 +463,7 @@ def _since(change: Change, earlier_ns: int, state: TorqueState) -> Change:
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
-    """Whether a leg as modelled, but for one clearance at most, explains a torque better than all others.
+    """True if a leg as modelled, but for one clearance at most, explains a torque better than all others.
 
     The explanations are sorted, the best first; UNKNOWN, the leg as modelled, is always among them.
     """

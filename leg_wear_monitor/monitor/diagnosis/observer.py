@@ -499,7 +499,7 @@ class TorqueObserver(KeepsSamples):
         self._restart(state.modelled_m)
 
     def _has_moved(self, peak_n: float, cycles: int) -> bool:
-        """Whether the foot's load in the last gait cycles differed from the reference's load."""
+        """True if the foot's load in the last gait cycles differed from the reference's load."""
         now_n = float(np.mean(self.state.carried_n[-cycles:]))
         is_renewed = abs(now_n - self.state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)
         return abs(now_n - peak_n) > _MOVED * max(peak_n, _LEAST_LOAD_N) and not is_renewed

@@ -155,12 +155,12 @@ def _sampled(one: TorqueSensor | CommissionedTorque, phases: int) -> str:
 
 
 def _is_unlike(state: TorqueState) -> bool:
-    """Whether the crank motion differs from all references, and not only as it starts or stops."""
+    """True if the crank motion differs from all references, and not only as it starts or stops."""
     return state.unused[-UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * UNUSABLE_CYCLES
 
 
 def _is_changing(state: TorqueState) -> bool:
-    """Whether the cadence changes: only a few of the last gait cycles are alike."""
+    """True if the cadence changes: only a few of the last gait cycles are alike."""
     last = (NotUsed.UNLIKE,) * _CHANGING_CYCLES
     return state.unused[-_CHANGING_CYCLES:] == last and len(state.waiting) <= _ALIKE_CYCLES
 

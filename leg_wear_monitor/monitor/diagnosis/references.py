@@ -201,16 +201,16 @@ class LegModels:
         return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
 
     def fits(self, state: TorqueState) -> bool:
-        """Whether the reference explains the commissioned leg well enough to name a joint."""
+        """True if the reference explains the commissioned leg well enough to name a joint."""
         return not state.is_load_other and self.misfit(state) < NAMED_TO
 
     def is_of_file(self, state: TorqueState) -> bool:
-        """Whether the commissioned leg matches the mechanism file, or the identified parameters."""
+        """True if the commissioned leg matches the mechanism file, or the identified parameters."""
         is_shape = state.is_loaded and state.rounds >= ROUNDS
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """Whether a clearance may be corrected: the leg is known and unchanged, its drive passes enough."""
+        """True if a clearance may be corrected: the leg is known and unchanged, its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
         is_changed = state.is_load_new or state.is_load_other or bool(state.interim_changes)
         return not is_changed and self.is_of_file(state) and is_near and not state.is_narrow
@@ -256,12 +256,12 @@ class References:
     part : TorqueReference or None
         Unfinished reference of an earlier run, which is continued if it fits.
     is_on_ground : bool
-        Whether the leg walks on the ground; then the force is identified.
+        True if the leg walks on the ground; then the force is identified.
 
     Attributes
     ----------
     may_be_late : bool
-        Whether the monitor never waits for simulations, see `TorqueReferenceRun`.
+        True if the monitor never waits for simulations, see `TorqueReferenceRun`.
 
     Raises
     ------
@@ -287,7 +287,7 @@ class References:
 
     @property
     def is_busy(self) -> bool:
-        """Whether legs are being simulated."""
+        """True if legs are being simulated."""
         return self._run is not None and self._run.is_busy
 
     @property
@@ -297,11 +297,11 @@ class References:
 
     @property
     def is_late(self) -> bool:
-        """Whether a simulation is overdue: the machine is too slow."""
+        """True if a simulation is overdue: the machine is too slow."""
         return self._run is not None and self._run.is_late
 
     def is_for(self, profile: CrankProfile) -> bool:
-        """Whether the running simulation is for this motion of the crank."""
+        """True if the running simulation is for this motion of the crank."""
         return self.is_busy and self._run is not None and profile.is_like(self._run.profile)
 
     @property
@@ -315,7 +315,7 @@ class References:
         return self._run.part if self._run is not None else None
 
     def is_given(self, reference: TorqueReference) -> bool:
-        """Whether a reference was known beforehand."""
+        """True if a reference was known beforehand."""
         return any(reference is one for one in self._given)
 
     def snapshot(self) -> ReferenceSnapshot | None:
@@ -339,7 +339,7 @@ class References:
         Returns
         -------
         bool
-            Whether the reference of the state was replaced, so that the kept cycles must be evaluated again.
+            True if the reference of the state was replaced, so that the kept cycles must be evaluated again.
         """
         if self._run is not None and self._run.is_busy:
             return self._continue(self._run, state, modelled_m, depth)
@@ -361,7 +361,7 @@ class References:
         return False
 
     def is_to_identify(self, state: TorqueState) -> bool:
-        """Whether another round of identification is due for the commissioned leg.
+        """True if another round of identification is due for the commissioned leg.
 
         A leg that was identified in an earlier run is identified again only if it differs from that result.
         """
@@ -376,11 +376,11 @@ class References:
         return self._models.misfit(state) >= least
 
     def is_load_left_out(self, state: TorqueState) -> bool:
-        """Whether the foot surely carries a load, but the configuration has the model walk without one."""
+        """True if the foot surely carries a load, but the configuration has the model walk without one."""
         return state.load is not None and state.load.is_sure and not self._is_on_ground
 
     def _may_be_loaded(self, state: TorqueState) -> bool:
-        """Whether to estimate the ground's force on a leg that has just been commissioned."""
+        """True if the ground's force is to be estimated on a leg that has just been commissioned."""
         is_new = state.commissioned is not None and not state.load_rounds and self._mechanism.toe is not None
         return is_new and (self._is_on_ground or not self._models.is_of_file(state))
 
@@ -533,7 +533,7 @@ class References:
 
 
 def _is_far(reference: TorqueReference, modelled_m: Floats) -> bool:
-    """Whether the expected leg of a reference has other clearances than the modelled ones (k,) [m]."""
+    """True if the expected leg of a reference has other clearances than the modelled ones (k,) [m]."""
     expected_m = np.maximum(modelled_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
     return bool((np.abs(reference.clearance_m[0] / expected_m - 1.0) > _FAR_FRACTION).any())
 

@@ -134,7 +134,7 @@ class Diagnosis:
     load : FootLoad or None
         Force of the ground that the foot surely carries.
     is_load_unknown : bool
-        Whether the leg walks on the ground, and neither a sensor nor the torque shows the ground's force.
+        True if the leg walks on the ground, and neither a sensor nor the torque shows the ground's force.
     compliance : float
         Compliance between the measured crank angle and the crank in the wear model [rad/(N m)]; 0 if rigid.
     temperature_c, commissioned_c : float or None
@@ -191,7 +191,7 @@ class Diagnosis:
         return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m
 
     def contradicts(self, explained: TorqueExplanation) -> bool:
-        """Whether the diagnosis names a different cause of a torque residual.
+        """True if the diagnosis names a different cause of a torque residual.
 
         The explanation compares with the model, and supposes faults of the inputs, a load or a mass.
         The diagnosis compares with this leg as it was, and supposes more; but it does not use a torque that
@@ -260,7 +260,7 @@ class AtCadence:
     cycles : tuple of SignedCycle
         The last gait cycles.
     is_final : bool
-        Whether a reference with the identified parameters explained the leg less well.
+        True if a reference with the identified parameters explained the leg less well.
     interim : Interim or None
     """
 
@@ -315,7 +315,7 @@ class TorqueState:
     settled : tuple of Change
         Changes that corrected the modelled clearances, and a change that a measurement contradicts.
     measured : tuple of bool
-        Whether each joint was measured since a correction; empty without one.
+        True if each joint was measured since a correction; empty without one.
     not_used : dict of str to int
         Gait cycles that were not used, by the values of `NotUsed`; replaced, never changed.
     unused : tuple of NotUsed
@@ -333,14 +333,14 @@ class TorqueState:
     renewed_n : float
         Load under which the leg was commissioned anew; NaN before.
     is_load_new : bool
-        Whether the load has changed, and the leg is to be commissioned under a reference of the new one; a
+        True if the load has changed, and the leg is to be commissioned under a reference of the new one; a
         baseline before that only serves to find the load, and may contain joints that opened meanwhile.
     is_load_other : bool
-        Whether the foot's load differs from the reference's load: no clearance is known, and no name sure.
+        True if the foot's load differs from the reference's load: no clearance is known, and no name sure.
     is_identifying : bool
-        Whether the run simulates legs with other parameters.
+        True if the run simulates legs with other parameters.
     has_failed : bool
-        Whether the leg could not be simulated for a reference.
+        True if the leg could not be simulated for a reference.
     failure : str
         Why the torques before gave no estimate; empty once there is a baseline.
     """
@@ -410,18 +410,18 @@ class TorqueState:
 
     @property
     def is_loaded(self) -> bool:
-        """Whether the reference walks on the ground."""
+        """True if the reference walks on the ground."""
         return self.reference is not None and self.reference.parameters.load.size > 0
 
     @property
     def is_narrow(self) -> bool:
-        """Whether the drive passes too little of the torque to tell the joints apart surely."""
+        """True if the drive passes too little of the torque to tell the joints apart surely."""
         one = self.sensor
         return one is not None and one.channel.bandwidth_hz * one.cycle_s < _LEAST_HARMONICS
 
     @property
     def is_compared(self) -> bool:
-        """Whether gait cycles are tested: not before a further cadence has a baseline of its own."""
+        """True if gait cycles are tested: not before a further cadence has a baseline of its own."""
         return self.commissioned is not None or not any(one.commissioned for one in self.set_aside)
 
     @property

@@ -128,7 +128,7 @@ class GrowthLaw:
 
 
 def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
-    """Growth that stays as it is, off by a standard deviation of its logarithm."""
+    """Constant growth, with a standard deviation of its logarithm."""
     k = len(fresh_m)
     return GrowthLaw(np.zeros((k, k)), fresh_m, np.full(k, np.inf), np.full(k, sigma))
 
@@ -361,7 +361,7 @@ class JointCondition:
         error of the model is not in it: it is the same in all cycles of a leg, and belongs to the factor of
         the wear coefficient, which a measured clearance corrects.
     has_coefficient : bool
-        Whether its wear coefficient is above 0; without one no wear is modelled.
+        True if its wear coefficient is above 0; without one no wear is modelled.
     """
 
     joint: str
@@ -407,7 +407,7 @@ def forecast(
     cycle_s : float
         Time of a gait cycle.
     valid : bool
-        Whether the model is valid for the present operation of the leg.
+        True if the model is valid for the present operation of the leg.
     """
     clearance_m, base_m, duty_h = _legs(now, estimates, settings, law)
     clearances = [quantiles(row) for row in clearance_m]
@@ -471,8 +471,9 @@ def _legs(
     sigma = law.sigma_to(limit[:, 0], settings.model_sigma)[:, None]
     log_rate = log_factor + np.hypot(sigma, relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
-    # The twin's growth belongs to its own clearances. The estimate of a factor is a mean over the part's
-    # past, in which the other clearances gradually departed from the twin's: half of their effect is in it.
+    # The twin's growth belongs to its own clearances. The estimate of a factor is a mean over the life of the
+    # part. During this time, the other clearances gradually departed from the twin's, so the estimate
+    # contains half of their effect.
     here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
     log_base = log_rate + 0.5 * (here - twin) - here
     duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])

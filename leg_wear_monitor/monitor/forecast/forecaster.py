@@ -57,8 +57,8 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
     mechanism : Mechanism
         As the configuration wants it.
     path : str
-        A file of its lives. If empty, the one that comes with the package for just this leg; if there is
-        none, growth stays as it is.
+        A file of its lives. If empty, the file of the package for this leg; without such a file, growth is
+        assumed constant.
     sigma : float
         Standard deviation of ln growth, if lives do not show it.
 
@@ -169,14 +169,14 @@ def _life(record: dict[str, Any], clearance_joints: Sequence[str]) -> SimulatedL
 
 
 def _numbers(values: Any) -> list[float]:
-    """A list of numbers as it is; numpy would take texts and flags for some."""
+    """An unchanged list of numbers; numpy would convert texts and flags to numbers."""
     if not isinstance(values, list) or not all(type(value) in (int, float) for value in values):
         raise ValueError("no list of numbers")
     return values
 
 
 def _can_be(life: SimulatedLife) -> bool:
-    """Whether the values of a life are possible; NaN is within no bounds."""
+    """True if the values of a life are possible; NaN is within no bounds."""
     within = (
         (life.factor, 1.0e-9, 1.0e9),
         (life.cycles, 0.0, 1.0e30),
@@ -256,7 +256,7 @@ class Forecaster:
         limits_m : sequence of float
             Of the mean clearances.
         is_valid : callable
-            Whether the leg is in the range of the model.
+            True if the leg is in the range of the model.
         model : ModelError
             Error of the growth because of the load.
         """
@@ -290,7 +290,7 @@ class Forecaster:
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]
-        # a new part's window is shorter than the others'
+        # the window of a new part is shorter than the windows of the other joints
         walked = max((window.moving_s for window in self.growth), key=len)
         self._last = forecast(
             now,
@@ -383,7 +383,7 @@ class Forecaster:
         Returns
         -------
         bool
-            Whether it is used: not if its tail probability is below `CONTRADICTS`.
+            True if it is used: not if its tail probability is below `CONTRADICTS`.
         """
         estimate = self._estimate(k, replaced_ns)
         below = estimate.probability_below(observation)

@@ -1,4 +1,4 @@
-"""A measured clearance and its meaning for the joint, in values and in words."""
+"""A measured clearance and its effects on the joint, as values and sentences."""
 
 import math
 from collections.abc import Sequence
@@ -64,7 +64,7 @@ class MeasurementResult:
     before, after : CoefficientEstimate
         Of the joint's wear coefficient.
     contradicts : bool
-        Whether the model holds it next to impossible.
+        True if the model holds it next to impossible.
     modelled_m : float
         Clearance that the twin had modelled for this part.
     words : tuple of str
@@ -96,7 +96,7 @@ class MeasurementResult:
 
     @property
     def agrees(self) -> bool:
-        """Whether the measurement agrees with the estimate by encoders or the drive torque."""
+        """True if the measurement agrees with the estimate by encoders or the drive torque."""
         sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
         return abs(self.measurement.clearance_m - self.shown_m) <= SURE_SIGMAS * sigma_m  # not with NaN
 
@@ -226,7 +226,7 @@ def measure(
     kept_ns : int
         Stamp of the ledger's last entry, 0 if there is none.
     accept : bool
-        Whether it counts even if it contradicts the model.
+        True if it counts even if it contradicts the model.
     corrections : sequence of CorrectedClearance and CoefficientSpan
         All of the ledger.
 

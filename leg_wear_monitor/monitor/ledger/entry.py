@@ -18,7 +18,7 @@ from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.torque_reference import TorqueReference
 from leg_wear_monitor.wear import SECTORS
 
-_CLASS_N = 100  # foot loads are told apart to this
+_CLASS_N = 100  # resolution of foot loads
 
 # fields of a mechanism that may change without a change of the worn parts
 # (a person is in the masses of the bodies)
@@ -130,7 +130,7 @@ class Run:
     number : int
         Number of the run, 0 before the first.
     closed : bool
-        Whether the run ended normally.
+        True if the run ended normally.
     interval_s : float
         Longest time in motion between two of its entries.
     epoch : int
@@ -337,7 +337,7 @@ class Measurement:
     expected_below : float
         Predicted probability of a smaller clearance.
     counts : bool
-        Whether the forecast uses it, unless it was withdrawn.
+        True if the forecast uses it, unless it was withdrawn.
     withdrawn_ns : int
         When it was withdrawn; 0 if it was not.
     withdrawn_by : str
@@ -362,7 +362,7 @@ class Measurement:
 
     @property
     def is_withdrawn(self) -> bool:
-        """Whether the measurement was withdrawn; it stays in the ledger, but is not used."""
+        """True if the measurement was withdrawn; it stays in the ledger, but is not used."""
         return self.withdrawn_ns != 0
 
 

@@ -31,7 +31,7 @@ class LedgerError(LegWearError):
 
 
 def connect(path: Path, binding: Binding) -> sqlite3.Connection:
-    """Open a ledger, and lock others out until the connection is closed; a new one is created.
+    """Open or create a ledger, and lock it until the connection is closed.
 
     Parameters
     ----------

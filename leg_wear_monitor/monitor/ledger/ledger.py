@@ -105,7 +105,7 @@ class Ledger:
     interval_s : float
         Intended longest time between two entries.
     at_end : bool
-        Whether the run is written only at its end, completely or not at all, as for a recording.
+        True if the run is written only at its end, completely or not at all, as for a recording.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Ledger:
         ----------
         entry : Entry
         closed : bool
-            Whether the run ends normally with this entry.
+            True if the run ends normally with this entry.
         """
         if self.at_end and not closed:
             return False
@@ -281,7 +281,7 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     mechanism : Mechanism
     config : MonitorConfig
     at_end : bool
-        Whether the run is written only at its end, completely or not at all, as for a recording.
+        True if the run is written only at its end, completely or not at all, as for a recording.
 
     Raises
     ------

@@ -253,7 +253,7 @@ def _beside(stored: Iterable[SimulatedReference], new: SimulatedReference) -> li
 
 
 def _is_alike(speed: float, other: float) -> bool:
-    """Whether two mean speeds of the crank [rad/s] are of the same cadence."""
+    """True if two mean speeds of the crank [rad/s] belong to the same cadence."""
     return abs(speed - other) <= UNLIKE * abs(other)
 
 

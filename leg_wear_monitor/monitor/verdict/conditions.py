@@ -92,7 +92,7 @@ def _of_alarms(situation: Situation, holds: Callable[[Alarm], bool]) -> list[Hit
 
 
 def _is_of_input(alarm: Alarm) -> bool:
-    """Whether an alarm is a present fault of the samples."""
+    """True if an alarm is a present fault of the samples."""
     return alarm.present is Level.ERROR and alarm.kind in (*INPUT_KINDS, SILENCE)
 
 
@@ -235,7 +235,7 @@ def changes(situation: Situation) -> tuple[Change, ...]:
 
 
 def words_of(change: Change, situation: Situation) -> str:
-    """A change in words, such as ``clearance of 0.62 mm in joint G``, with the change since the baseline."""
+    """Text for a change, such as ``clearance of 0.62 mm in joint G``, with the change since the baseline."""
     if change.cause is Cause.CLEARANCE:
         opened = estimate(change.value - change.counted, change.sigma, "m")
         value, counted = amount(change.value, "m"), amount(change.counted, "m")
@@ -421,7 +421,7 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
 
 
 def not_compared(situation: Situation) -> Sequence[Hit]:
-    """There is a drive torque, but not yet enough of it to be compared, or to raise its alarm."""
+    """There is a drive torque, but too few gait cycles to compare it or to raise its alarm."""
     if not situation.has_torque or not situation.has_cycle:
         return []
     for alarm in situation.alarms:
@@ -432,7 +432,7 @@ def not_compared(situation: Situation) -> Sequence[Hit]:
 
 
 def not_observed(situation: Situation) -> Sequence[Hit]:
-    """Neither the diagnosis nor an encoder shows some joints, or not yet.
+    """The diagnosis and the encoders do not show some joints, or not yet.
 
     The torque residual shows broken hip and knee joints, but not broken foot joints (monitor.md), so a leg
     without a torque residual is not known to be healthy. If the user switched the diagnosis off, this does

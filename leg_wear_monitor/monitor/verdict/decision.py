@@ -1,6 +1,6 @@
 """How soon to act on a verdict, how sure it is, the check that settles it, and the cost of an error.
 
-Nothing here is kept: all of it follows from the verdict's code and state.
+Nothing here is stored: it follows from the code and the state of the verdict.
 """
 
 from leg_wear_monitor.monitor.verdict.table import ALARM, MeasuredFigure, Rule, rules, table
@@ -15,7 +15,7 @@ def _rule(state: LegState) -> Rule:
 
 
 def _holds_for(figure: MeasuredFigure, state: LegState) -> bool:
-    """Whether a leg meets the conditions of the cases in which an accuracy was measured."""
+    """True if a leg meets the conditions of the cases in which an accuracy was measured."""
     joint = state.clearances.get(state.verdict.joints[0]) if state.verdict.joints else None
     return (
         figure.on_ground in (None, bool(state.load.peak_n))
@@ -45,7 +45,7 @@ def how_sure(state: LegState) -> str:
 
 
 def decision_of(state: LegState) -> list[tuple[str, str]]:
-    """The verdict of a leg as lines for a person, each with its title."""
+    """The verdict of a leg as lines for operators, each with its title."""
     advice = table().advice[_rule(state).advice]
     return [
         ("How soon", how_soon(state)),

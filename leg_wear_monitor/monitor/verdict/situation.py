@@ -74,9 +74,9 @@ class JointSituation:
     sigma_m : float
         Standard deviation of the modelled clearance; NaN if the torque is not compared.
     is_used : bool
-        Whether the forecast uses the encoders' estimate of this joint.
+        True if the forecast uses the encoders' estimate of this joint.
     is_measurement_used : bool
-        Whether it rests on `measured`; not on one that contradicts the model.
+        True if it rests on `measured`; not on one that contradicts the model.
     replaced_ns, part_cycles : int
         When its part was replaced, 0 if it never was, and the gait cycles of this part.
     """
@@ -105,9 +105,9 @@ class Situation:
     joints : tuple of JointSituation
     alarms : tuple of Alarm
     has_cycle : bool
-        Whether a whole gait cycle was monitored in this run.
+        True if a whole gait cycle was monitored in this run.
     has_torque : bool
-        Whether the last gait cycle has samples of the drive torque.
+        True if the last gait cycle has samples of the drive torque.
     mismatch, mismatch_limit : float
         Part of the drive torque that is not explained, as a fraction of the predicted RMS; NaN if it is not
         known.
@@ -155,7 +155,7 @@ class Situation:
         return ", ".join(map(self.joint_words, joints))
 
     def is_trusted(self, kind: str, since_ns: int) -> bool:
-        """Whether a case began before a fault of the samples that show it, by the name of their kind."""
+        """True if a case began before a fault of the samples that show it, by the name of their kind."""
         ends_ns = [end_ns for code, end_ns in self.trusted_before_ns.items() if KINDS[code].name == kind]
         return all(0 < since_ns < end_ns for end_ns in ends_ns)
 
@@ -201,12 +201,12 @@ def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance 
 
 
 def is_surely_below(limit_m: float, known: KnownClearance) -> bool:
-    """Whether a clearance contradicts that a joint is at its limit."""
+    """True if a clearance contradicts that a joint is at its limit."""
     return known.clearance_m + SURE_SIGMAS * known.sigma_m < limit_m
 
 
 def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
-    """Whether a measurement contradicts the estimate behind an alarm of the clearance.
+    """True if a measurement contradicts the estimate behind an alarm of the clearance.
 
     The modelled clearance is below the limit as well: a measurement does not end an alarm of the model. The
     alarm was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
@@ -237,7 +237,7 @@ def believed(joint: JointSituation, alarm: Alarm | None, is_counted_leg: bool) -
     alarm : Alarm or None
         Alarm of the joint's clearance.
     is_counted_leg : bool
-        Whether the verdict does not list the modelled clearances as not valid.
+        True if the verdict does not list the modelled clearances as not valid.
     """
     known, estimate = judged(joint), at_limit_by_estimate(joint, alarm)
     if estimate is not None and estimate.clearance_m > known.clearance_m:
@@ -256,5 +256,5 @@ def joint_status(joint: str, is_known: bool, findings: Sequence[Verdict]) -> Sta
 
 
 def is_observed(alarm: Alarm, by: Sequence[str] = (MEASURED, BOTH, *SEEN)) -> bool:
-    """Whether an alarm of the clearance is present because of some sources, not the model alone."""
+    """True if an alarm of the clearance is present because of some sources, not the model alone."""
     return alarm.present is not Level.OK and alarm.cause in by

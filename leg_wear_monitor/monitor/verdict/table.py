@@ -120,11 +120,11 @@ class MeasuredFigure:
     date : str
         Date of the measurement.
     on_ground : bool or None
-        Whether the legs walked on the ground (True) or in the air (False); None if it makes no difference.
+        True if the legs walked on the ground, False in the air; None if it makes no difference.
     needs_sure_names : bool
-        Whether the cases had a model that fits the leg, so that the names of joints were sure.
+        True if the cases had a model that fits the leg, so that the names of joints were sure.
     needs_diagnosis : bool
-        Whether the drive torque showed the modelled clearances before the case.
+        True if the drive torque showed the modelled clearances before the case.
     by : str or None
         Source of the joint's clearance in these cases; None for any source.
     """

@@ -12,7 +12,7 @@ _TIMING = "TORQUE_TIMING"
 
 
 def level_of(verdict: Verdict) -> Level:
-    """Level in diagnostics: a leg that did not walk yet is no fault."""
+    """Level in diagnostics: a leg that has not walked yet is not a fault."""
     if verdict.state is State.HEALTHY:
         return Level.OK
     if verdict.state is State.WATCH or verdict.fault_code == NO_GAIT_CYCLE:
@@ -58,7 +58,7 @@ def dated(findings: Iterable[Verdict], before: Iterable[Verdict], stamp_ns: int)
 
 
 def has_changed(before: Verdict | None, after: Verdict) -> bool:
-    """Whether a verdict is to be reported again: not for values alone, which change in each gait cycle."""
+    """True if a verdict must be reported again; values alone change in each gait cycle."""
     return before is None or _identity(before) != _identity(after)
 
 

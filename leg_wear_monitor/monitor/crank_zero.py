@@ -1,4 +1,4 @@
-"""Holds samples back until the crank's zero is found, then passes them on.
+"""The zero of the crank's encoder, from the phase of the drive torque; samples wait until it is found.
 
 An encoder on the motor's shaft starts at zero at each boot. Samples wait while the zero is looked for, and
 follow it: no gait cycle is lost, as long as it is found among the samples that may wait. It is looked for at
@@ -10,138 +10,38 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
-from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
-from leg_wear_monitor.estimate.torque_model import TorqueModel
+from leg_wear_monitor.estimate import torque_fit
+from leg_wear_monitor.estimate.joint_motion import Pair, Series, motion_of, paired, series
+from leg_wear_monitor.estimate.torque_fit import Start
+from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD, TorqueModel
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.alarms import CRANK_ZERO
+from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.crank_walk import LEAST_TURNS, MOST_TURNS, Walk, Zero, last_walk, zero_of
-from leg_wear_monitor.monitor.inputs import begin, distance, extend, guess_speed
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin import CRANK, KINDS
 from leg_wear_monitor.twin.sample import (
+    AVERAGE,
     BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
     GATE_RAD,
-    NO_FAULT,
     Samples,
     TrackerSettings,
-)
-from leg_wear_monitor.twin.tracker import LARGEST_ANGLE
-
-# Restarts of the crank's encoder: places where its angle does not continue, in the order of arrival.
-
-
-_TURN = 2.0 * math.pi
-
-SETTINGS = np.dtype(
-    [
-        ("gate", "f8"),  # largest difference of an angle from its series [rad]
-        ("largest", "f8"),  # largest accepted speed [rad/s]
-        ("gap", "f8"),  # longest within a series [s]
-        ("commanded", "f8"),  # speed [rad/s]
-    ]
-)
-STATE = np.dtype(
-    [
-        # for the crank's series, and for a second series that may take its place
-        ("number", "i8", (2,)),  # samples
-        ("stamp", "i8", (2,)),  # stamp of the last sample [ns]
-        ("angle", "f8", (2,)),  # [rad]
-        ("speed", "f8", (2,)),  # [rad/s]
-        ("first_stamp", "i8"),  # first stamp of the second series [ns]
-        ("first_angle", "f8"),  # [rad]
-        ("event", "i8"),  # at the sample where the search ended
-    ]
+    is_valid,
+    of_crank,
 )
 
-# The angle leaves its series; it is back, or a different series has taken its place without a restart; it is
-# in a different series, so the encoder has restarted.
-LEAVES, CONTINUES, RESTARTS = range(3)
-
-_SURE = 3  # samples of a new series; the tracker accepts a series after five, see `twin.tracker.tracking`
-_WRAP = 1.5 * _TURN  # an angle that is wrapped to a turn jumps by less
-
-
-@kernel
-def _is_counted_on(settings, state):
-    """True if the angle after a gap is too large for an encoder that restarted in it."""
-    gap = 1.0e-9 * (state.first_stamp - state.stamp[0])
-    return gap > settings.gap and abs(state.first_angle) > settings.largest * gap + _TURN
-
-
-@kernel
-def _belongs(settings, state, k, stamp, angle):
-    """True if an angle continues series k."""
-    guess_speed(settings, state, k, stamp, angle)
-    ahead = state.speed[k] * 1.0e-9 * (stamp - state.stamp[k])
-    if abs(angle - state.angle[k] - ahead) > _WRAP:
-        return False
-    return distance(settings, state, k, stamp, angle) < math.inf
-
-
-@kernel
-def _take_over(state):
-    """The second series becomes the crank's."""
-    state.number[0], state.stamp[0] = state.number[1], state.stamp[1]
-    state.angle[0], state.speed[0] = state.angle[1], state.speed[1]
-    state.number[1] = 0
-
-
-@kernel
-def _event(settings, state, stamp, angle):
-    """Event at one more sample; -1 for none."""
-    if state.number[0] == 0:
-        begin(state, 0, stamp, angle)
-        return -1
-    since = 1.0e-9 * (stamp - state.stamp[0])
-    if -settings.gap <= since <= 0.0:  # late or repeated
-        return -1
-    if _belongs(settings, state, 0, stamp, angle):
-        extend(state, 0, stamp, angle)
-        was_left = state.number[1] > 0
-        state.number[1] = 0
-        return CONTINUES if was_left else -1
-    if state.number[1] > 0 and _belongs(settings, state, 1, stamp, angle):
-        extend(state, 1, stamp, angle)
-        if state.number[1] < _SURE:
-            return -1
-        event = CONTINUES if _is_counted_on(settings, state) else RESTARTS
-        _take_over(state)
-        return event
-    event = LEAVES if state.number[1] == 0 else -1
-    begin(state, 1, stamp, angle)
-    state.first_stamp, state.first_angle = stamp, angle
-    return event
-
-
-@entry
-def find_event(all_settings, states, stamp, kind, angle, fault, first):
-    """Index of the sample, from ``first`` on, at which the next event is; -1 if there is none.
-
-    ``all_settings`` and ``states`` have one record each; the state is changed, and its ``event`` names the
-    event.
-    """
-    settings, state = all_settings[0], states[0]
-    for i in range(first, stamp.shape[0]):
-        if kind[i] != CRANK or fault[i] != NO_FAULT or stamp[i] <= 0 or not abs(angle[i]) <= LARGEST_ANGLE:
-            continue
-        event = _event(settings, state, stamp[i], angle[i])
-        if event >= 0:
-            state.event = event
-            return i
-    return -1
-
-
-_A_CYCLE = 4  # evaluation periods of a gait cycle
-_MOST_PERIODS = _A_CYCLE * (MOST_TURNS + 4)  # samples wait so long; enough for a slower cadence
+_A_CYCLE = 4  # evaluation periods of a gait cycle: the least between two attempts, which take 0.1 s each
+_MOST_PERIODS = 80  # samples wait so long; enough for a slower cadence
 _MOST_SAMPLES = 400_000  # 30 MB
-_LONGEST_DOUBT = _A_CYCLE  # periods after which an angle that neither continues nor restarts is a new series
-
-_LONGEST_REST = 4 * _A_CYCLE  # periods between attempts, because an attempt takes a tenth of a second
+_LONGEST_DOUBT = 2  # periods in which an angle that left its course may come back
+_BACK_RAD = 0.25  # an angle that left its course is back if it is that near
 
 _NONE: Samples = np.zeros(0, GAIT_SAMPLE)
 
@@ -154,42 +54,44 @@ class CrankZeroState:
     ----------
     zero : Zero or None
         The present one.
+    former : Zero or None
+        The one before the angle left its course; None once it is sure that the encoder has restarted.
+    doubts : int
+        Evaluation periods since then.
+    off_rad : float
+        By how much the angle is off its former course.
     times_found : int
     turns : int
         Turns of the present walk.
     why : str
         Why no zero was found; empty while there was no attempt.
-    attempts : int
-        Attempts in vain of this search.
     rest : int
         Periods until the next attempt.
     waiting : tuple of Samples
         Samples that wait for the zero, by evaluation periods; the last one is not over.
-    doubtful : tuple of Samples
-        Samples since the angle has left its series.
-    doubts : int
-        Periods since then.
+    last_ns, last_rad : int, float
+        Stamp and angle of the last crank sample; stamp 0 before the first.
+    since_ns : int
+        Stamp of the first crank sample of this search.
     has_passed : bool
-        True if samples were passed on in this run.
-    waiting_s : float
-        Time of the samples that wait, up to the last period that is over.
-    dropped_s, before_s : float
-        Time of samples that waited too long in this search, and in all before the first samples were passed
-        on, after which the twin counts the time.
+        True if samples were passed on; the twin counts the time from then on.
+    before_s : float
+        Time before, of earlier searches and of samples that waited too long.
     """
 
-    zero: Zero | None = None
+    zero: "Zero | None" = None
+    former: "Zero | None" = None
+    doubts: int = 0
+    off_rad: float = 0.0
     times_found: int = 0
     turns: int = 0
     why: str = ""
-    attempts: int = 0
     rest: int = 0
-    waiting: tuple[Samples, ...] = ()
-    doubtful: tuple[Samples, ...] = ()
-    doubts: int = 0
+    waiting: tuple[Samples, ...] = (_NONE,)
+    last_ns: int = 0
+    last_rad: float = 0.0
+    since_ns: int = 0
     has_passed: bool = False
-    waiting_s: float = 0.0
-    dropped_s: float = 0.0
     before_s: float = 0.0
 
 
@@ -204,18 +106,8 @@ class CrankZero(Observer):
     """
 
     def __init__(self, model: TorqueModel, config: MonitorConfig, tracker: TrackerSettings) -> None:
-        self._model, self._config = model, config
-        self._gap_s = BRIDGE_LIMIT_S
-        self._settings = new_records(1, SETTINGS)
-        speed = tracker.commanded_speed_radps
-        self._settings[0] = GATE_RAD, tracker.largest_speed, self._gap_s, speed
-        self._series = new_records(1, STATE)
-        self._event: Record = record_of(self._series)
+        self._model, self._config, self._tracker = model, config, tracker
         self.state = CrankZeroState()
-
-    def warm_up(self) -> None:
-        """Compile, before the first sample."""
-        self.passed(_NONE, ends_period=False)
 
     def passed(self, samples: Samples, ends_period: bool) -> Samples:
         """Samples to track now, with the zero: these samples, earlier ones that waited, or none.
@@ -226,20 +118,106 @@ class CrankZero(Observer):
         ends_period : bool
             True if an evaluation period ends with them.
         """
-        out: list[Samples] = []
-        stamp, kind, fault = (np.array(samples[name]) for name in ("stamp_ns", "kind", "fault"))
-        angle, begin = np.array(samples["crank_angle_rad"]), 0
-        while True:
-            at = find_event(self._settings, self._series, stamp, kind, angle, fault, begin)
-            self._add(samples[begin : at if at >= 0 else None], out)
-            if at < 0:
-                break
-            self._take_event(out)
-            self._add(samples[at : at + 1], out)
-            begin = at + 1
-        if ends_period:
-            self._end_period(out)
-        return np.concatenate([_NONE, *out])
+        state, out, begin = self.state, [_NONE], 0
+        for at, off_rad in self._breaks(samples):
+            out.append(self._taken(samples[begin:at]))
+            begin = at
+            if state.former is None:
+                self._begin(int(samples["stamp_ns"][at]))
+            state.off_rad += off_rad
+        out.append(self._taken(samples[begin:]))
+        if ends_period and state.zero is None:
+            out.append(self._end_period())
+        return np.concatenate(out)
+
+    def _breaks(self, samples: Samples) -> list[tuple[int, float]]:
+        """Index of each crank sample that does not continue the one before, and its jump; NaN after a gap.
+
+        The encoder may have restarted there. It did not in a gap after which the angle has counted on.
+        """
+        state, tracker = self.state, self._tracker
+        is_possible = np.abs(samples["crank_angle_rad"]) <= KINDS[CRANK].largest
+        at = np.flatnonzero((samples["kind"] == CRANK) & is_valid(samples) & is_possible)
+        if not len(at):
+            return []
+        stamp_ns, angle = samples["stamp_ns"][at], samples["crank_angle_rad"][at]
+        state.since_ns = state.since_ns or int(stamp_ns[0])
+        before = (state.last_ns, state.last_rad) if state.last_ns else (stamp_ns[0], angle[0])
+        state.last_ns, state.last_rad = int(stamp_ns[-1]), float(angle[-1])
+        time_s = np.abs(1.0e-9 * np.diff(stamp_ns, prepend=before[0]))
+        moved = (np.diff(angle, prepend=before[1]) + math.pi) % TURN - math.pi
+        reach = tracker.largest_speed * time_s
+        is_gap = time_s > BRIDGE_LIMIT_S
+        is_break = np.where(is_gap, np.abs(angle) <= reach + TURN, np.abs(moved) > GATE_RAD + reach)
+        jump = np.where(is_gap, math.nan, moved)
+        return [(int(at[k]), float(jump[k])) for k in np.flatnonzero(is_break)]
+
+    def _begin(self, stamp_ns: int) -> None:
+        """Begin to look for the zero; samples that wait belong to a different one."""
+        state = self.state
+        if state.zero is None and not state.has_passed:
+            state.before_s += max(0.0, 1.0e-9 * (stamp_ns - state.since_ns))
+        state.former, state.zero, state.off_rad, state.doubts = state.zero, None, 0.0, 0
+        state.waiting, state.since_ns = (_NONE,), stamp_ns
+        state.turns, state.why, state.rest = 0, "", 0
+
+    def _taken(self, samples: Samples) -> Samples:
+        """Samples without a break: with the zero; none if they have to wait."""
+        state = self.state
+        if state.zero is None:
+            *before, last = state.waiting
+            state.waiting = (*before, np.concatenate([last, samples]))
+            return _NONE
+        state.has_passed |= len(samples) > 0
+        samples = samples.copy()
+        samples["crank_angle_rad"] += state.zero.offset_rad
+        return samples
+
+    def _end_period(self) -> Samples:
+        """Look for the zero; returns the samples that need not wait any longer."""
+        state = self.state
+        if state.former and abs((state.off_rad + math.pi) % TURN - math.pi) < _BACK_RAD:
+            return self._released(state.former)  # it was a glitch
+        state.doubts += 1
+        if state.doubts >= _LONGEST_DOUBT:
+            state.former = None
+        waiting = np.concatenate(state.waiting)
+        walk = last_walk(waiting, self._config.cadence, BRIDGE_LIMIT_S)
+        state.turns, state.rest = walk.turns, max(0, state.rest - 1)
+        if walk.turns < LEAST_TURNS:
+            state.why = walk.why
+        elif not state.rest:
+            found = self._found(walk)
+            if isinstance(found, Zero):
+                state.times_found += 1
+                return self._released(found)
+            state.why, state.rest = found, _A_CYCLE
+        lengths = np.cumsum([len(part) for part in reversed(state.waiting)])
+        kept = min(_MOST_PERIODS, int(np.count_nonzero(lengths <= _MOST_SAMPLES)))
+        rest = state.waiting[-kept:]
+        first_ns = of_crank(np.concatenate(rest))["stamp_ns"][:1]
+        if kept < len(lengths) and len(first_ns):
+            state.before_s += 0.0 if state.has_passed else max(0.0, 1.0e-9 * (first_ns[0] - state.since_ns))
+            state.since_ns = int(first_ns[0])
+        state.waiting = (*rest, _NONE)
+        return _NONE
+
+    def _found(self, walk: "Walk") -> "Zero | str":
+        """The zero from the newest turns, else from all; else why it cannot be found."""
+        sampling = self._config.drive_torque.sampling
+        if walk.turns > LEAST_TURNS:
+            # a fault of the torque that is over must not be waited out
+            found = zero_of(walk.newest(LEAST_TURNS), self._model, sampling)
+            if isinstance(found, Zero):
+                return found
+        return zero_of(walk, self._model, sampling)
+
+    def _released(self, zero: "Zero") -> Samples:
+        """All samples that wait, with the zero."""
+        state = self.state
+        waiting, state.waiting = np.concatenate(state.waiting), (_NONE,)
+        state.zero, state.former, state.why = zero, None, ""
+        return self._taken(waiting)
 
     @property
     def cause(self) -> str:
@@ -256,8 +234,8 @@ class CrankZero(Observer):
     def unmonitored_s(self) -> float:
         """Time [s] of samples that wait, or waited in vain, as far as the twin does not count it."""
         state = self.state
-        last_s = _duration_s(state.waiting[-1:], self._gap_s)
-        return state.before_s + state.dropped_s + state.waiting_s + last_s
+        waiting_s = 0.0 if state.zero else max(0.0, 1.0e-9 * (state.last_ns - state.since_ns))
+        return state.before_s + waiting_s
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
@@ -266,11 +244,10 @@ class CrankZero(Observer):
 
     @property
     def statuses(self) -> Sequence[Status]:
-        """The zero of the crank's encoder and its runner-up, or why it is not known."""
+        """The zero of the crank's encoder, or why it is not known."""
         state, zero = self.state, self.state.zero
-        found = ("offset_rad", "sigma_rad", "mismatch", "other_rad", "other_mismatch")
         values = {
-            **{name: getattr(zero, name, math.nan) for name in found},
+            **{name: getattr(zero, name, math.nan) for name in ("offset_rad", "sigma_rad", "mismatch")},
             "turns": float(zero.turns if zero else state.turns),
             "least_turns": float(LEAST_TURNS),
             "times_found": float(state.times_found),
@@ -281,113 +258,228 @@ class CrankZero(Observer):
         offset = estimate(zero.offset_rad, zero.sigma_rad, "rad")
         return (Status("crank zero", Level.OK, f"crank angle at joint position 0: {offset}", values),)
 
-    def _add(self, samples: Samples, out: list[Samples]) -> None:
-        """Add samples without an event."""
-        state = self.state
-        if not len(samples):
-            return
-        if state.doubtful:
-            state.doubtful = (*state.doubtful, samples.copy())
-        elif state.zero is not None:
-            out.append(self._placed(samples, state.zero))
-        else:
-            *before, last = state.waiting or (_NONE,)
-            state.waiting = (*before, np.concatenate([last, samples]))
 
-    def _placed(self, samples: Samples, zero: Zero) -> Samples:
-        self.state.has_passed = True
-        samples = samples.copy()
-        samples["crank_angle_rad"] += zero.offset_rad
-        return samples
-
-    def _take_event(self, out: list[Samples]) -> None:
-        """Settle the doubtful samples before the sample of an event is added."""
-        state, event = self.state, int(self._event.event)
-        if event == LEAVES:
-            state.doubtful, state.doubts = (_NONE,), 0
-            return
-        doubtful, state.doubtful = np.concatenate([_NONE, *state.doubtful]), ()
-        if event == RESTARTS:
-            self._begin()
-        self._add(doubtful, out)
-
-    def _begin(self) -> None:
-        """Begin to look for the zero of an encoder that has restarted."""
-        state = self.state
-        self._drop(len(state.waiting))
-        state.zero, state.turns, state.why, state.waiting_s = None, 0, "", 0.0
-        state.attempts, state.rest = 0, 0
-
-    def _drop(self, number: int) -> None:
-        """Drop the samples of the first periods; their time is not monitored."""
-        state, following = self.state, self.state.waiting[number : number + 1]
-        if number:
-            # the step to the first kept sample is lost as well
-            lost = (*state.waiting[:number], *(part[part["kind"] == CRANK][:1] for part in following))
-            state.dropped_s += _duration_s(lost, self._gap_s)
-            state.waiting = state.waiting[number:]
-
-    def _end_period(self, out: list[Samples]) -> None:
-        state = self.state
-        if state.doubtful:
-            state.doubts += 1
-            if state.doubts > _LONGEST_DOUBT:
-                doubtful, state.doubtful = np.concatenate(state.doubtful), ()
-                self._begin()
-                self._series["number"] = 0
-                self._add(doubtful, out)
-        if state.zero is None:
-            self._look()
-            out += self._released()
-
-    def _look(self) -> None:
-        """Look for the zero among the samples that wait."""
-        state = self.state
-        waiting = np.concatenate([_NONE, *state.waiting])
-        walk = last_walk(waiting, self._config.cadence, self._gap_s)
-        state.turns, state.rest = walk.turns, max(0, state.rest - 1)
-        if walk.turns < LEAST_TURNS:
-            state.why = walk.why
-        elif not state.rest:
-            found = self._found(walk)
-            if isinstance(found, Zero):
-                state.zero, state.why, state.times_found = found, "", state.times_found + 1
-                return
-            state.attempts += 1
-            state.why, state.rest = found, min(state.attempts * _A_CYCLE, _LONGEST_REST)
-        self._drop(self._too_many())
-        state.waiting_s = _duration_s(state.waiting, self._gap_s)
-        state.waiting = (*state.waiting, _NONE)
-
-    def _found(self, walk: Walk) -> Zero | str:
-        """The zero from the newest turns, else from all; else why it cannot be found."""
-        sampling = self._config.drive_torque.sampling
-        if walk.turns > LEAST_TURNS:
-            # a fault of the torque that is over must not be waited out
-            found = zero_of(walk.newest(LEAST_TURNS), self._model, sampling)
-            if isinstance(found, Zero):
-                return found
-        return zero_of(walk, self._model, sampling)
-
-    def _too_many(self) -> int:
-        """Number of periods whose samples cannot wait any longer."""
-        lengths = np.cumsum([len(part) for part in reversed(self.state.waiting)])
-        return max(len(lengths) - _MOST_PERIODS, int(np.count_nonzero(lengths > _MOST_SAMPLES)))
-
-    def _released(self) -> list[Samples]:
-        """All samples that wait, with the zero; none while it is not found."""
-        state = self.state
-        if state.zero is None:
-            return []
-        if not state.has_passed:
-            state.before_s += state.dropped_s
-        waiting, state.waiting, state.waiting_s, state.dropped_s = state.waiting, (), 0.0, 0.0
-        return [self._placed(np.concatenate([_NONE, *waiting]), state.zero)]
+# Turns of the crank that were walked at the commanded cadence, among the samples that wait.
 
 
-def _duration_s(parts: tuple[Samples, ...], longest_gap_s: float) -> float:
-    """Time [s] that crank samples cover, without gaps."""
-    samples = np.concatenate([_NONE, *parts])
-    is_sound = (samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT) & (samples["stamp_ns"] > 0)
-    steps_s = 1.0e-9 * np.diff(np.sort(samples["stamp_ns"][is_sound]))
-    return float(steps_s[steps_s <= longest_gap_s].sum())
+MOST_TURNS = 16  # as many as a sensor that samples instants needs, see docs/appendix/commissioning.md
+_STANDS = 0.1  # turns in the time of a gait cycle
+_LONGEST = 1.5  # times the time of the commanded turns, for slower ones
+
+
+@attrs.frozen(eq=False)
+class Walk:
+    """The last turns at the commanded cadence.
+
+    Attributes
+    ----------
+    turns : int
+        Number of turns, at most `MOST_TURNS`.
+    why : str
+        Why there are no turns; empty if there are some.
+    crank, torque : Series
+        Crank angle up to the unknown zero, counted on over turns [rad], and drive torque [N m] meanwhile.
+    """
+
+    turns: int
+    why: str
+    crank: Series
+    torque: Series
+
+    def newest(self, turns: int) -> "Walk":
+        """Its newest turns."""
+        to_go = np.abs(self.crank.value[-1] - self.crank.value) / TURN
+        first = int(np.flatnonzero(to_go >= turns)[-1])
+        return _from(self.crank.time_s[first], turns, self.crank, self.torque)
+
+
+def last_walk(samples: Samples, cadence: Cadence, longest_gap_s: float) -> Walk:
+    """The last walk among samples in any order.
+
+    Parameters
+    ----------
+    samples : (n,) array of GAIT_SAMPLE
+    cadence : Cadence
+    longest_gap_s : float
+        Between crank samples of a turn.
+    """
+    sound = samples[is_valid(samples)]
+    origin_ns = int(np.median(sound["stamp_ns"])) if len(sound) else 0
+    longest_ns = int(_LONGEST * MOST_TURNS * 60.0e9 / abs(cadence.commanded_rpm))
+    sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # stray stamps are left out
+    crank = _series(sound[sound["kind"] == CRANK], "crank_angle_rad", origin_ns)
+    crank = attrs.evolve(crank, value=np.asarray(np.unwrap(crank.value)))
+    first, turns, why = _turns(crank, cadence, longest_gap_s)
+    torque = _series(sound, "torque_nm", origin_ns)
+    return _from(crank.time_s[first], turns, crank, torque) if turns else Walk(0, why, crank, torque)
+
+
+def _from(begin_s: float, turns: int, crank: Series, torque: Series) -> Walk:
+    walked = (torque.time_s >= begin_s) & (torque.time_s <= crank.time_s[-1])
+    return Walk(turns, "", _part(crank, crank.time_s >= begin_s), _part(torque, walked))
+
+
+def _series(samples: Samples, name: str, origin_ns: int) -> Series:
+    return series(samples["stamp_ns"], samples[name], np.zeros(len(samples), np.int64), origin_ns)
+
+
+def _part(whole: Series, which: NDArray[np.bool_]) -> Series:
+    return Series(whole.time_s[which], whole.value[which], whole.recording[which])
+
+
+def _turns(crank: Series, cadence: Cadence, longest_gap_s: float) -> tuple[int, int, str]:
+    """Index of the first sample of the last turns, their number, and why there are none."""
+    if not len(crank.value):
+        return 0, 0, "no crank sample can be used"
+    time_s, commanded = crank.time_s, cadence.commanded_rpm
+    back: Floats = np.sign(commanded) * (crank.value[-1] - crank.value) / TURN  # turns until now
+    is_gap = np.diff(time_s, append=time_s[-1]) > longest_gap_s
+    end, turns = len(time_s) - 1, 0
+    while turns < MOST_TURNS:
+        before = np.flatnonzero(back[: end + 1] >= turns + 1.0)
+        if not len(before) or is_gap[before[-1] : end].any():
+            break
+        rpm = float(np.sign(commanded)) * 60.0 / float(time_s[end] - time_s[before[-1]])
+        if abs(rpm - commanded) > cadence.tolerance_rpm:
+            break
+        end, turns = int(before[-1]), turns + 1
+    return end, turns, "" if turns else _why_none(crank, cadence)
+
+
+def _why_none(crank: Series, cadence: Cadence) -> str:
+    """Why the last turn was not walked at the commanded cadence; empty if it was not long enough."""
+    cycle_s = 60.0 / abs(cadence.commanded_rpm)
+    before = np.flatnonzero(crank.time_s <= crank.time_s[-1] - cycle_s)
+    if not len(before):
+        return ""
+    passed_s = float(crank.time_s[-1] - crank.time_s[before[-1]])
+    turned = float(crank.value[-1] - crank.value[before[-1]]) / TURN
+    if abs(turned) < _STANDS:
+        return "the leg stands"
+    rpm = 60.0 * turned / passed_s
+    if abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
+        return ""
+    return (
+        f"the leg walks at {rpm:.3g} rpm; the commanded cadence is {cadence.commanded_rpm:.3g} ± "
+        f"{cadence.tolerance_rpm:.2g} rpm"
+    )
+
+
+# The crank's zero from the phase of the drive torque, or why it cannot be found.
+
+
+LEAST_TURNS = 3  # two were enough for sensors that average; the third shows the repeating residual
+_SURE_RAD = 0.015  # scatter that a found zero may have in addition to the error of the model
+_LEAST_SAMPLES = 25  # torque samples in a turn: two and a half in a period of the tenth harmonic
+_SCANNED = 100  # samples of a turn that are enough to find the phases that are worth a fit
+_STARTS = 3  # phases that are fitted
+_APART_RAD = 0.3  # two phases nearer than that are one
+_UNLIKE = 0.7  # torque residual from which on less than half of the torque's energy is explained
+_ANOTHER_LEG = 0.5  # repeating residual from which on the torque comes from a different leg
+_DIGITS = 6  # digits of a zero [rad]: further digits may depend on the library of linear algebra
+
+
+@attrs.frozen
+class Zero:
+    """A zero that was found.
+
+    Attributes
+    ----------
+    offset_rad, sigma_rad : float
+        Crank angle at joint position 0, from -pi to pi, and its standard deviation.
+    turns : int
+        Turns of the crank from which the zero was found.
+    mismatch : float
+        Torque residual: RMS of the unexplained torque over the RMS of the measured torque.
+    """
+
+    offset_rad: float
+    sigma_rad: float
+    turns: int
+    mismatch: float
+
+
+def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
+    """The crank's zero from a walk of at least `LEAST_TURNS`; else why it cannot be found.
+
+    Parameters
+    ----------
+    walk : Walk
+    model : TorqueModel
+    sampling : str
+        Value of `drive_torque.sampling`.
+    """
+    found = len(walk.torque.value)
+    if not found:
+        return "there is no drive torque"
+    if found < _LEAST_SAMPLES * walk.turns:
+        return (
+            f"the drive torque has {found} samples in {walk.turns} turns. Expected {_LEAST_SAMPLES} per turn"
+        )
+    pair = paired(motion_of(walk.crank), walk.torque)
+    if len(pair.torque) < _LEAST_SAMPLES or not float(pair.torque.std()) > 0.0:
+        return "the drive torque does not change"
+    fits = _fits(pair, walk.turns, model, 0.5 * pair.interval_s if sampling == AVERAGE else 0.0)
+    if not fits:
+        return "the drive torque does not fit this leg at any crank angle: see drive_torque.sign"
+    best = fits[0]
+    apart = [abs(math.remainder(_angle(one) - _angle(best), TURN)) for one in fits]
+    rivals = [one for one, angle in zip(fits, apart, strict=True) if angle > _APART_RAD]
+    doubt = _doubt(best, rivals)
+    if doubt:
+        return doubt
+    return Zero(
+        offset_rad=round(_angle(best), _DIGITS),
+        sigma_rad=round(math.hypot(best.sigma["offset_rad"], PHASE_ERROR_RAD), _DIGITS),
+        turns=walk.turns,
+        mismatch=best.mismatch,
+    )
+
+
+def _fits(pair: Pair, turns: int, model: TorqueModel, lag_s: float) -> list[torque_fit.Fit]:
+    """Fits near the phases that explain most, with the configured sign, the best first."""
+    start = Start(ratio=1.0, offset_rad=0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
+    middle = float(np.median(pair.position_rad))
+    terms = torque_fit.Terms(ratio=False, load=bool(model.load.any()))  # the foot may be on the ground
+    few = pair.part(slice(None, None, max(1, len(pair.torque) // (_SCANNED * turns))))
+    starts = [
+        attrs.evolve(start, offset_rad=phase - middle)
+        for phase in _peaks(torque_fit.explained_by_phase(few, model, start, middle))
+    ]
+    fits = [torque_fit.fit(pair, model, one, terms) for one in starts]
+    fits = sorted((one for one in fits if one.gain > 0.0), key=lambda one: one.mismatch)
+    return [torque_fit.fit(pair, model, one.refined, terms, with_errors=True) for one in fits[:1]] + fits[1:]
+
+
+def _peaks(explained: Floats) -> list[float]:
+    """Phases [rad] of the largest local maxima above 0."""
+    is_peak = (explained > np.roll(explained, 1)) & (explained >= np.roll(explained, -1)) & (explained > 0.0)
+    peaks = np.flatnonzero(is_peak)
+    best = peaks[np.argsort(-explained[peaks], kind="stable")][:_STARTS]
+    return [float(phase) for phase in best * (TURN / torque_fit.PHASES)]
+
+
+def _angle(one: torque_fit.Fit) -> float:
+    """Crank angle at joint position 0 [rad]."""
+    return one.offset_rad[0]
+
+
+def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
+    """Why the best fit need not be the truth; empty if it is."""
+    if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
+        return (
+            f"the drive torque does not fit this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
+            f"its RMS remain unexplained"
+        )
+    if rivals and torque_fit.too_alike(best, rivals[0]):
+        return (
+            f"{_angle(best):.2f} and {_angle(rivals[0]):.2f} rad explain "
+            "the drive torque almost equally well "
+            f"(mismatch {best.mismatch:.2f} and {rivals[0].mismatch:.2f})"
+        )
+    if best.sigma["offset_rad"] > _SURE_RAD:
+        return (
+            f"it is known to ± {best.sigma['offset_rad']:.2g} rad. Expected {_SURE_RAD:g} rad: the drive "
+            "torque scatters"
+        )
+    return ""

@@ -266,7 +266,7 @@ class Stretch:
     torque_ns, torque : (m,) arrays
         Stamps, and drive torques on the crank [N m].
     spikes : float
-        Fraction of the torques that the guard left out as outliers.
+        Fraction of the torques that the guard left out as outliers; 0 if they are few.
     size_nm : float
         RMS of the predicted drive torque.
     config : MonitorConfig
@@ -326,7 +326,9 @@ _FROZEN = 0.2  # fraction of a gait cycle in which a torque that freezes has the
 _STEADY = 0.5  # largest relative difference of the speeds in two halves of a stretch
 _IN_TURNS = 0.1  # largest relative difference from the commanded speed, if in turns instead of radians
 _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
-_SPIKES = 0.03  # fraction of torque samples that are outliers: fewer are counted and left out
+# fraction of torque samples that are outliers: fewer are counted and left out, so many are a fault until they
+# are far fewer
+_SPIKES, _FEWER_SPIKES = 0.05, 0.02
 _LEAST_SPIKES = 10  # fewer than that may come together by chance
 _ALIKE = 0.5  # correlation of torques over the crank angle
 _PHASES = (32, 16)  # phases of a gait cycle in which torques are compared
@@ -413,7 +415,7 @@ def _saturated(one: Stretch) -> Words | None:
 
 
 def _spikes(one: Stretch) -> Words | None:
-    return {"percent": f"{100.0 * one.spikes:.1f}"} if one.spikes > _SPIKES else None
+    return {"percent": f"{100.0 * one.spikes:.1f}"} if one.spikes else None
 
 
 @attrs.frozen(kw_only=True)
@@ -441,7 +443,7 @@ class InputRule:
     needs_motion: bool = True
 
 
-JUMP, NOT_OF_GAIT = "CRANK_JUMP", "TORQUE_NOT_OF_GAIT"
+JUMP, SPIKES, NOT_OF_GAIT = "CRANK_JUMP", "TORQUE_SPIKES", "TORQUE_NOT_OF_GAIT"
 _NO_JOINT = "; no joint is observed"
 INPUT_RULES = (
     InputRule(
@@ -487,7 +489,7 @@ INPUT_RULES = (
         "monitor",
     ),
     InputRule(
-        code="TORQUE_SPIKES",
+        code=SPIKES,
         kind=TORQUE,
         words=_spikes,
         why="{percent} % of the drive torques are spikes since {since}" + _NO_JOINT,
@@ -642,6 +644,8 @@ class JudgeState:
         Torque of the gait cycle before, in equal phases.
     has_refused : bool
         True if a gait cycle of this evaluation period was refused.
+    was_refused : bool
+        True if the last gait cycle was refused.
     """
 
     pieces: tuple[Samples, ...] = ()
@@ -652,6 +656,7 @@ class JudgeState:
     jumped_rad: float = 0.0
     before: Floats | None = None
     has_refused: bool = False
+    was_refused: bool = False
 
 
 class InputJudge:
@@ -719,9 +724,10 @@ class InputJudge:
             self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))
         last = np.concatenate(state.pieces[-_PERIODS:])
         found = spikes - state.spikes[0]
-        part = (
-            found / (found + len(of_torque(np.concatenate(state.pieces)))) if found > _LEAST_SPIKES else 0.0
-        )
+        part = found / max(1, found + len(of_torque(np.concatenate(state.pieces))))
+        most = _FEWER_SPIKES if SPIKES in state.faults else _SPIKES
+        if found <= _LEAST_SPIKES or part <= most:
+            part = 0.0
         self._take(Stretch.of(last, part, self._size_nm, self.config))
         if is_withheld:
             state.jumped_rad = 0.0
@@ -739,7 +745,8 @@ class InputJudge:
         if is_strange:
             self._note(NOT_OF_GAIT, {}, statistics.begin_ns, end_ns)
         kinds = {one.rule.kind for one in state.faults.values()}
-        state.has_refused |= bool(kinds)
+        state.was_refused = bool(kinds)
+        state.has_refused |= state.was_refused
         return frozenset(kinds | ({TORQUE} if CRANK in kinds else set()))
 
     def _is_strange(self, profile: TorqueProfile) -> bool:

@@ -125,7 +125,8 @@ def situation_of(leg: MonitoredLeg) -> Situation:
         joints=_joint_situations(leg),
         alarms=tuple(alarms.values()),
         has_cycle=last is not None,
-        has_torque=last is not None and last.torque_samples > 0,
+        # the torque of a refused gait cycle has come, and is not compared
+        has_torque=last is not None and (last.torque_samples > 0 or leg.judge.state.was_refused),
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
         torque_causes=torque.causes,

@@ -14,11 +14,9 @@ from collections.abc import Callable, Iterable, Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import LEAST_DELAY_S, MOST_DELAY_S, Cause
 from leg_wear_monitor.estimate.drive import (
     DIRECT,
-    LEAST_DELAY_S,
-    MOST_DELAY_S,
     UNDECLARED,
     Channel,
     DriveFigures,

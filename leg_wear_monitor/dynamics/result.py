@@ -307,17 +307,6 @@ JsonObject = dict[str, Any]
 _OF_EVERY_JOINT = ("mean_force_n", "rms_force_n", "p99_force_n", "max_force_n")
 
 
-def joint_document(joint: JointResult) -> JsonObject:
-    """Fields of a joint; contact and wear are present for clearance joints only."""
-    record = attrs.asdict(joint)
-    return record if joint.has_clearance else {name: record[name] for name in _OF_EVERY_JOINT}
-
-
-def trace_document(trace: Trace) -> JsonObject:
-    """Fields of a trace with lists as columns; without the fields that a mechanism without a toe lacks."""
-    return {name: value for name, value in part_document(trace).items() if value is not None}
-
-
 # Tables of a simulation's result; a column's name is the path of the value, joined by dots.
 
 
@@ -470,11 +459,21 @@ class SimulationResult:
             "drive_torque_nm": part_document(self.drive_torque_nm),
             "energy_j": part_document(self.energy_j),
             "toe": part_document(self.toe),
-            "joints": {name: joint_document(joint) for name, joint in self.joints.items()},
+            "joints": {
+                name: {
+                    key: value
+                    for key, value in attrs.asdict(joint).items()
+                    if joint.has_clearance or key in _OF_EVERY_JOINT
+                }
+                for name, joint in self.joints.items()
+            },
             "impacts": {name: [part_document(one) for one in all_] for name, all_ in self.impacts.items()},
             "standard_error": self.standard_error,
         }
-        return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
+        if self.trace is not None:  # a mechanism without a toe lacks some fields
+            trace = part_document(self.trace).items()
+            record["trace"] = {name: value for name, value in trace if value is not None}
+        return record
 
     def to_json(self, wall_s: float | None = None) -> str:
         """Text of `to_dict`, as written by ``simulate --json``.

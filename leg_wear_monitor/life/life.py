@@ -264,7 +264,7 @@ class LifeRun:
         for setup in self._setups:
             setup.surfaces.depth[:] = depth
         self._advance(self.settings.settle_cycles)
-        worn, archard, peak, toe = [], [], [], []
+        worn, archard, peak = [], [], []
         for _ in range(self.settings.cycles):
             before = [setup.surfaces.depth.copy() for setup in self._setups]
             statistics_of_all = self._advance(1)
@@ -272,14 +272,12 @@ class LifeRun:
             worn.append([setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)])
             archard.append([statistics.integral[joints, ARCHARD] for statistics in statistics_of_all])
             peak.append([statistics.peak[joints] for statistics in statistics_of_all])
-            toe.append([statistics.response[0] for statistics in statistics_of_all])
         smooth_deg = self.settings.jump.smooth_deg
         rates = [wear_rate(one, smooth_deg) for one in self._by_part(worn)]
         return LifePoint(
             depth=depth,
             rate=mean_rate(rates, self._shares),
             peak_force_n=self._by_part(peak).mean(axis=1).max(axis=0),
-            toe_position_m=float(self._by_part(toe).mean(axis=1).max()),
             rubbing_j_per_cycle=weighted(self._by_part(archard).mean(axis=1), self._shares),
             part_growth_m=np.array([rate.clearance for rate in rates]),
             archard_j=np.zeros(len(self.clearance_joints)),

@@ -135,8 +135,6 @@ class LifePoint:
         Mean wear per cycle around this time.
     peak_force_n : (k,) array
         Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
-    toe_position_m : float
-        Largest distance of the toe from the ideal linkage's toe in a cycle, likewise; 0 without a toe.
     rubbing_j_per_cycle : (k,) array
         Integral of ``F_N |v_t| dt`` over a gait cycle, mean over the simulated cycles.
     archard_j : (k,) array
@@ -151,7 +149,6 @@ class LifePoint:
     depth: Floats
     rate: WearRate
     peak_force_n: Floats
-    toe_position_m: float
     rubbing_j_per_cycle: Floats
     archard_j: Floats
     part_growth_m: Floats

@@ -129,16 +129,11 @@ def _clearances(mechanism: Mechanism) -> Iterator[str]:
     moduli = sorted({modulus for c in clearance_joints for modulus in c.youngs_modulus})
     if moduli:
         yield "E " + " and ".join(f"{1.0e-9 * modulus:.4g}" for modulus in moduli) + " GPa"
-    yield from _pairs(mechanism)
+    for pair, names in regimes(mechanism, mechanism.clearance_joints).items():
+        yield f"material of {', '.join(names)}: {pair}"
     for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in clearance_joints}):
         ratio = 100.0 * fresh / radius
         yield f"clearance {1.0e3 * fresh:.4g} mm in a radius of {1.0e3 * radius:.4g} mm ({ratio:.2g} %)"
-
-
-def _pairs(mechanism: Mechanism) -> Iterator[str]:
-    """Material pairs of the clearance joints, with regime and wear coefficients."""
-    for what, names in regimes(mechanism, mechanism.clearance_joints).items():
-        yield f"material of {', '.join(names)}: {what}"
 
 
 # Settings of the clearance joints of a mechanism file: defaults merged with each joint's own settings.

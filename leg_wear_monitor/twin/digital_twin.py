@@ -417,7 +417,7 @@ class DigitalTwin:
         if reached == run.DONE:
             reached = stepper.advance(polynomial, time, self._statistics)[0]
         depth[:] = worn
-        stepper.drop_pending_wear()
+        stepper.state.pending[:] = 0.0
         if reached != run.DONE:  # continue from centred journals; the next step reports the failure
             stepper.init(angle, speed)
             self._leg.force[:] = 0.0

@@ -337,15 +337,13 @@ class Intake:
 
 
 def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
-    """Concatenation of sample statistics."""
-    if len(parts) < 2:
-        return parts[0] if parts else no_samples(clearance_joints)
-    names = [field.name for field in attrs.fields(SampleStatistics)]
-    return SampleStatistics(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def no_samples(clearance_joints: int) -> SampleStatistics:
-    """Empty sample statistics."""
+    """Concatenation of sample statistics; empty ones without parts."""
+    if len(parts) == 1:
+        return parts[0]
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     none, forces = np.zeros(0), np.zeros((0, clearance_joints))
-    return SampleStatistics(stamps, stamps, none, none, forces, none, np.zeros((0, clearance_joints, 2)))
+    empty = SampleStatistics(stamps, stamps, none, none, forces, none, np.zeros((0, clearance_joints, 2)))
+    names = [field.name for field in attrs.fields(SampleStatistics)]
+    return SampleStatistics(
+        *(np.concatenate([getattr(part, name) for part in parts or (empty,)]) for name in names)
+    )

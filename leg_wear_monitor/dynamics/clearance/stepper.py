@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -163,10 +163,6 @@ class ClearanceStepper:
     def set_eccentricities(self, eccentricity: Floats) -> None:
         """Set the eccentricities (k, 2) [m]."""
         self.state.e[:] = eccentricity.ravel()
-
-    def drop_pending_wear(self) -> None:
-        """Discard the wear that is not yet deposited on the surfaces."""
-        self.state.pending[:] = 0.0
 
     def snapshot_mask(self, name: str) -> Flags:
         """Mask (s,) of the entries of a snapshot's ``motion`` that belong to a field of `ClearanceState`."""
@@ -384,21 +380,10 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
     return model, state, clearance_work(model, state)
 
 
-def advance_arguments() -> tuple[Any, ...]:
-    """Arguments of the types that `advance_clearances` is called with."""
-    model, state, work = _leg()
-    return model, 0, state, np.zeros(7), 0.0, new_run_statistics(1), work
-
-
-def observe_arguments() -> tuple[Any, ...]:
-    """Arguments of the types that `observe` is called with."""
-    model, state, work = _leg()
-    return model, 0, state, work
-
-
 def compile_advance() -> None:
-    """Compile `advance_clearances`, or load it."""
-    compile_for(advance_clearances, *advance_arguments())
+    """Compile `advance_clearances` for the types that it is called with, or load it."""
+    model, state, work = _leg()
+    compile_for(advance_clearances, model, 0, state, np.zeros(7), 0.0, new_run_statistics(1), work)
 
 
 def advance_beside() -> AbstractContextManager[None]:
@@ -410,7 +395,8 @@ def advance_beside() -> AbstractContextManager[None]:
 def motion_beside() -> Iterator[None]:
     """Have two processes compile the motion: the second `advance_clearances`, this process `observe`."""
     with advance_beside():
-        compile_for(observe, *observe_arguments())
+        model, state, work = _leg()
+        compile_for(observe, model, 0, state, work)
         yield
 
 

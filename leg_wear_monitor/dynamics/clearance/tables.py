@@ -160,16 +160,6 @@ def _levers(basis: Basis) -> dict[str, Floats]:
     }
 
 
-def _lever_slopes(basis: Basis) -> Floats:
-    """Derivatives (N, d, k) by e of ``lever_drive``."""
-    return project(basis.s_t, basis.friction)
-
-
-def _friction_reactions(basis: Basis, rows: list[int]) -> Floats:
-    """Drive torque and reactions of the ideal joints per friction force (N, k, r)."""
-    return project(-basis.friction, basis.x[:, :, rows])
-
-
 def _coarse(points: int) -> list[int]:
     """Every `COARSER`-th point of a turn, the first repeated at the end."""
     return [*range(0, points, COARSER), 0]
@@ -211,22 +201,13 @@ def _bend(basis: Basis) -> Floats:
     return np.asarray(bend.reshape(n + 1, d, d, d).transpose(0, 3, 2, 1))
 
 
-def _inverse_mass_slopes(basis: Basis) -> Floats:
-    """Derivatives (M + 1, d, d, d) of the inverse mass by e.
-
-    The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
-    """
-    change = basis.inverse_mass[_coarse(len(basis.s))][:, None] @ _bend(basis)
-    return np.asarray(-(change + change.transpose(0, 1, 3, 2)))
-
-
 def _by_e(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Singles:
     """Table ``by_e``."""
     d, coarse = len(basis.rows), _coarse(len(basis.s))
     free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
     parts = {
         "free": free.transpose(0, 3, 1, 2),
-        "lever_drive": _lever_slopes(basis),
+        "lever_drive": project(basis.s_t, basis.friction),
         "load_power": np.concatenate(
             [basis.load_e.transpose(0, 2, 1), basis.drive_load_e[:, :, None]], axis=2
         ),
@@ -234,7 +215,9 @@ def _by_e(_linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Singles:
         "torque_v": basis.c_ee.transpose(0, 2, 1),
     }
     parts = {name: part[coarse] for name, part in parts.items()}
-    parts["inverse_mass"] = _inverse_mass_slopes(basis)
+    # the inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1
+    change = basis.inverse_mass[coarse][:, None] @ _bend(basis)
+    parts["inverse_mass"] = -(change + change.transpose(0, 1, 3, 2))
     columns = [parts[name].reshape(len(coarse), d, -1) for name in changing_shapes(d // 2)]
     return _in_blocks(np.concatenate(columns, axis=2, dtype=np.float32))
 
@@ -299,7 +282,8 @@ def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Float
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by.append(basis.drag[:, :, :-1])
     others = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
-    columns = np.concatenate([others, _friction_reactions(basis, rows)], axis=1)
+    by_friction = project(-basis.friction, basis.x[:, :, rows])
+    columns = np.concatenate([others, by_friction], axis=1)
     reaction = np.zeros((len(columns) + 1, columns.shape[1], padded(len(rows))))
     reaction[:-1, :, : len(rows)] = columns
     reaction[-1] = reaction[0]

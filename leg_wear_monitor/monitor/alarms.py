@@ -11,7 +11,7 @@ import attrs
 
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.state import Level
+from leg_wear_monitor.state import LegAlarm, Level
 
 # Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
 #
@@ -367,6 +367,20 @@ def state_of(alarm: Alarm) -> str:
         return "OK"
     present = "present" if alarm.present is alarm.level else "latched"
     return f"{present}, acknowledged" if alarm.acknowledged else present
+
+
+def leg_alarm(alarm: Alarm) -> LegAlarm:
+    """An alarm as operators see it."""
+    return LegAlarm(
+        name=alarm.name,
+        level=alarm.level,
+        state=state_of(alarm),
+        value=alarm.value,
+        limit=alarm.limit,
+        unit=alarm.unit,
+        worst=alarm.worst,
+        raised_ns=alarm.raised_ns,
+    )
 
 
 _LAST = {"torque": "last estimate", "encoders": "last estimate", "measured": "last measured"}

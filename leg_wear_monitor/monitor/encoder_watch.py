@@ -8,7 +8,6 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import ENCODERS, worst_code
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.counted_leg import CountedLeg
 from leg_wear_monitor.monitor.encoders import EncoderObserver, faults
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
@@ -16,6 +15,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
+from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
@@ -26,7 +26,7 @@ class EncoderWatch(Observer):
 
     Parameters
     ----------
-    leg : CountedLeg
+    leg : WearModel
     board : AlarmBoard
 
     Attributes
@@ -36,7 +36,7 @@ class EncoderWatch(Observer):
         Estimates of the last gait cycle, and whether the forecast uses them.
     """
 
-    def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
+    def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
         self._leg, self._board = leg, board
         self.encoders = EncoderObserver(
             leg.mechanism,

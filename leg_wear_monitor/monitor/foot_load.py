@@ -27,11 +27,11 @@ from leg_wear_monitor.monitor.alarms import (
     ZERO,
     worst_code,
 )
-from leg_wear_monitor.monitor.counted_leg import CountedLeg
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.verdict.situation import ACTS
+from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import FootLoad, Level
 from leg_wear_monitor.twin import KINDS, LOAD
 from leg_wear_monitor.twin.follower_state import FINE_PHASES
@@ -71,7 +71,7 @@ class FootLoadCheck(Observer):
 
     Parameters
     ----------
-    leg : CountedLeg
+    leg : WearModel
     board : AlarmBoard
 
     Raises
@@ -80,7 +80,7 @@ class FootLoadCheck(Observer):
         For a mechanism whose toe does not walk.
     """
 
-    def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
+    def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
         self._twin, self._board = leg.twin, board
         mechanism, config = leg.mechanism, leg.config
         linkage = build_linkage(mechanism)

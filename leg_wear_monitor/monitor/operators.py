@@ -15,14 +15,6 @@ from leg_wear_monitor.monitor.alarms import Alarm, joint_of
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.gait_evidence import MismatchWindow
-from leg_wear_monitor.monitor.judgement import (
-    evaluate_clearances,
-    is_forecast_valid,
-    shown,
-    situation_of,
-    update_verdict,
-    verdict_report,
-)
 from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement, VerdictEvent
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, with_forecast
@@ -117,7 +109,7 @@ def measure(
 ) -> MeasurementResult:
     """See `WearMonitor.measure`."""
     accounting, joint = leg.accounting, leg.mechanism.clearance_joint(joint)
-    wear, best = accounting.wear_of(joint), shown(leg, _situation(leg, joint))
+    wear, best = accounting.wear_of(joint), leg.estimate_of(_situation(leg, joint))
     earlier = leg.forecaster.measurements
     found = leg.forecaster.measured(
         wear,
@@ -196,7 +188,7 @@ def renew_forecast(leg: MonitoredLeg) -> CycleReport | None:
     forecast = leg.forecaster.renewed(
         leg.worn_m(leg.twin.clearance_mean_m),
         leg.evaluation.board.clearance_limits_m,
-        is_forecast_valid(leg, verdict_report(leg).findings),
+        leg.is_forecast_valid(leg.verdict_report().findings),
         leg.model_error,
     )
     leg.last = with_forecast(last, forecast, leg.measured)
@@ -204,7 +196,7 @@ def renew_forecast(leg: MonitoredLeg) -> CycleReport | None:
 
 
 def _situation(leg: MonitoredLeg, joint: str) -> JointSituation:
-    return next(each for each in situation_of(leg).joints if each.joint == joint)
+    return next(each for each in leg.situation().joints if each.joint == joint)
 
 
 def _note_alarms(leg: MonitoredLeg, stamp_ns: int) -> None:
@@ -248,9 +240,9 @@ def note_verdict(leg: MonitoredLeg, stamp_ns: int, milder: bool = True) -> None:
     False, it keeps a more severe verdict.
     """
     if leg.findings or leg.accounting.ledger is None:
-        update_verdict(leg)
+        leg.update_verdict()
         return
-    now = situation_of(leg)
+    now = leg.situation()
     known = Situation(joints=now.joints, alarms=now.alarms, mismatch=math.nan)
     verdict, last = verdict_of(dated(findings(known), (), stamp_ns)), leg.accounting.ledger.verdict
     if milder or last is None or verdict.state.severity >= last.state.severity:
@@ -269,10 +261,10 @@ def _note_clearance_verdict(
 
 def _compare(leg: MonitoredLeg, joint: str, stamp_ns: int) -> bool:
     """Compare a new measurement with the limit; return whether it ends an alarm that it contradicts."""
-    joints = situation_of(leg).joints
+    joints = leg.situation().joints
     board, name = leg.evaluation.board, alarm_specs.CLEARANCE.name(joint)
     is_ended = any(each.joint == joint and _ends(each, board.alarms[name]) for each in joints)
-    for change in evaluate_clearances(leg, joints, stamp_ns):
+    for change in leg.evaluate_clearances(joints, stamp_ns):
         leg.accounting.note_alarms(change)
     if is_ended:
         board.acknowledge_one(name)

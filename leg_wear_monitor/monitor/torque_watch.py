@@ -16,7 +16,6 @@ from leg_wear_monitor.monitor.alarm_specs import MISMATCH, TORQUE
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.counted_leg import CountedLeg
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
@@ -34,6 +33,7 @@ from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import LOADS_N, Samples
@@ -58,7 +58,7 @@ class TorqueWatch(Observer):
 
     Parameters
     ----------
-    leg : CountedLeg
+    leg : WearModel
     board : AlarmBoard
 
     Attributes
@@ -71,7 +71,7 @@ class TorqueWatch(Observer):
         Why a torque residual has no explanation; empty if it has one, or if the residual is small.
     """
 
-    def __init__(self, leg: CountedLeg, board: AlarmBoard) -> None:
+    def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
         self._leg, self._board = leg, board
         self.record = TorqueRecord(leg.accounting.commissioned)
         self.mismatch = MismatchWindow()

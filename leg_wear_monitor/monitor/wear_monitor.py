@@ -14,20 +14,11 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, all_extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts
-from leg_wear_monitor.monitor.judgement import (
-    evaluate_clearances,
-    is_forecast_valid,
-    leg_state,
-    situation_of,
-    update_verdict,
-    verdict_report,
-)
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -161,87 +152,78 @@ class WearMonitor:
         Reports
             They end before the newest sample by the tracker's lag.
         """
-        leg = self._leg
+        leg, accounting = self._leg, self._accounting
         sampled: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
-        for piece, ends_period in leg.evaluation_periods.pieces(samples):
-            # guard: only accepted samples go on
-            believed = self._believed(piece, ends_period)
-            # twin: motion, forces and wear of the leg; the observers get the same samples
-            followed, ended = self._follow(believed)
-            sampled.append(followed)
-            # observers, alarms, report of each gait cycle that ended
-            for statistics in ended:
-                cycles.append(self._end_cycle(statistics, changes))
-            # observers, alarms, verdict, and the state of the leg at the end of an evaluation period
+        for received, ends_period in leg.evaluation_periods.pieces(samples):
+            # Guard: samples go on that were not counted before and come from one source, once the zero of the
+            # crank is known.
+            piece = leg.guard.checked(accounting.not_counted(received))
+            for observer in leg.observers:
+                piece = observer.passed(piece, ends_period)
+            accounting.without_zero_s = sum(each.unmonitored_s for each in leg.observers)
+            # Twin: motion, forces and wear of the leg. The observers get the same samples.
+            tracked = self._twin.update(piece)
+            leg.judge.add_samples(piece)
+            leg.evaluation.add_samples(piece)
+            for observer in leg.observers:
+                observer.add_samples(piece)
+            accounting.followed(tracked.samples)
+            sampled.append(tracked.samples)
+            leg.happened = tracked.events[-1] if tracked.events else leg.happened
+            # Observers, report and alarms of each gait cycle that ended.
+            cycles += [self._end_cycle(statistics, changes) for statistics in tracked.cycles]
             if ends_period:
+                # Alarms of the input and of clearances; only periods end alike however the stream is cut.
                 before = len(changes)
                 situation = self._end_period(changes)
-                changed = update_verdict(leg, situation)
+                # Verdict: the most severe rule that holds for this situation.
+                changed = leg.update_verdict(situation)
                 verdicts += changed
+                # Report: the state of the leg, if a gait cycle ended or something changed.
                 is_new = bool(changed) or leg.has_ended or len(changes) > before
                 leg.has_ended = False
                 if is_new and self.reports_states:
                     states.append(self._state_report(leg.findings, situation))
-            self._accounting.keep_if_due(self._board.alarms.values())
-        samples_ = joined(sampled, len(self.clearance_joints))
-        return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states))
-
-    def _believed(self, piece: Samples, ends_period: bool) -> Samples:
-        """Accepted samples: new, from one source, with a known zero of the crank."""
-        piece = self._leg.guard.checked(self._accounting.not_counted(piece))
-        for observer in self._leg.observers:
-            piece = observer.passed(piece, ends_period)
-        self._accounting.without_zero_s = sum(each.unmonitored_s for each in self._leg.observers)
-        return piece
-
-    def _follow(self, piece: Samples) -> tuple[SampleReports, tuple[CycleStatistics, ...]]:
-        """Pass samples to the twin and to the observers; returns tracked samples, and ended cycles."""
-        leg = self._leg
-        update = self._twin.update(piece)
-        leg.judge.add_samples(piece)
-        leg.evaluation.add_samples(piece)
-        for observer in leg.observers:
-            observer.add_samples(piece)
-        self._accounting.followed(update.samples)
-        if update.events:
-            leg.happened = update.events[-1]
-        return update.samples, update.cycles
+            accounting.keep_if_due(self._board.alarms.values())
+        tracked_samples = joined(sampled, len(self.clearance_joints))
+        return Reports(
+            tracked_samples, tuple(cycles), tuple(changes), self.lost, tuple(verdicts), tuple(states)
+        )
 
     def _end_cycle(self, statistics: CycleStatistics, changes: list[AlarmList]) -> CycleReport:
         """Report a gait cycle, and evaluate its alarms."""
         leg = self._leg
+        # A torque from a faulty input is not compared.
         refused = leg.judge.end_cycle(statistics)
         if refused:
             statistics = statistics.without_torque
+        # Observers: estimates of this gait cycle.
         self._accounting.ended(statistics)
         leg.growth = all_extended(leg.growth, statistics, GROWTH_CYCLES)
         for observer in leg.observers:
             observer.end_cycle(statistics, bool(refused))
-        leg.last = report = self._report(statistics)
-        self._accounting.note_clearances(report)
+        # Report, with growth, estimates and forecast.
+        forecast = leg.forecaster.after(
+            statistics,
+            leg.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
+            self.clearance_limits_m,
+            lambda: leg.is_forecast_valid(leg.findings),
+            leg.model_error,
+        )
+        seen = leg.encoders.estimates if leg.encoders else None
+        leg.last = report = leg.report(statistics, forecast, seen, list(map(surest, leg.seen)))
         leg.has_ended = True
+        self._accounting.note_clearances(report)
+        # Alarms: values of the report and of the observers, which then learn from the gait cycle.
         values = {name: one for each in leg.observers for name, one in each.alarm_values(report).items()}
         self._take_changes(leg.evaluation.end_cycle(report, values, CRANK in refused), changes)
         for observer in leg.observers:
             observer.judge(statistics, report)
         return report
-
-    def _report(self, statistics: CycleStatistics) -> CycleReport:
-        """Report of a gait cycle, with growth, estimates and forecast."""
-        leg = self._leg
-        forecast = leg.forecaster.after(
-            statistics,
-            leg.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
-            self.clearance_limits_m,
-            lambda: is_forecast_valid(leg, leg.findings),
-            leg.model_error,
-        )
-        seen = leg.encoders.estimates if leg.encoders else None
-        return cycle_report(leg, statistics, forecast, seen, list(map(surest, leg.seen)))
 
     def _end_period(self, changes: list[AlarmList]) -> Situation:
         """Evaluate the input and the observers' results; returns the inputs of the verdict."""
@@ -253,8 +235,8 @@ class WearMonitor:
         self._take_changes(leg.evaluation.end_period(self._accounting.skipped, is_refused), changes)
         for observer in leg.observers:
             observer.end_period()
-        situation = situation_of(leg)
-        self._take_changes(evaluate_clearances(leg, situation.joints, self._twin.intake.stamp_ns), changes)
+        situation = leg.situation()
+        self._take_changes(leg.evaluate_clearances(situation.joints, self._twin.intake.stamp_ns), changes)
         return attrs.evolve(situation, alarms=tuple(self._board.alarms.values()))
 
     def _take_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
@@ -287,16 +269,16 @@ class WearMonitor:
     @property
     def verdict(self) -> VerdictReport:
         """The verdict now; `update` reports its changes at the ends of evaluation periods."""
-        return verdict_report(self._leg)
+        return self._leg.verdict_report()
 
     @property
     def state_report(self) -> VerdictReport:
         """The verdict now, with the state of the leg."""
-        situation = situation_of(self._leg)
-        return self._state_report(verdict_report(self._leg, situation).findings, situation)
+        situation = self._leg.situation()
+        return self._state_report(self._leg.verdict_report(situation).findings, situation)
 
     def _state_report(self, findings: tuple[Verdict, ...], situation: Situation) -> VerdictReport:
-        state = leg_state(self._leg, findings, situation)
+        state = self._leg.state(findings, situation)
         return VerdictReport(state.stamp_ns, findings, state)
 
     @property
@@ -310,7 +292,7 @@ class WearMonitor:
         ledger = self._accounting.ledger
         if ledger is None or ledger.verdict is None:
             return self.state
-        state = leg_state(self._leg, (ledger.verdict,), situation_of(self._leg))
+        state = self._leg.state((ledger.verdict,), self._leg.situation())
         return attrs.evolve(state, stamp_ns=ledger.kept_ns)
 
     @property
@@ -544,7 +526,7 @@ class WearMonitor:
         if ledger is None:
             return
         if self._leg.findings:
-            is_noted = bool(update_verdict(self._leg))
+            is_noted = bool(self._leg.update_verdict())
             if not is_noted and any(is_observed(alarm, SEEN) for alarm in self.alarms.alarms):
                 # the ledger's verdict names the last estimate
                 last = self.verdict

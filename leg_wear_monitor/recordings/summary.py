@@ -16,11 +16,10 @@ from leg_wear_monitor.files import or_nan, with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, has_changed
+from leg_wear_monitor.monitor.alarms import ADVICE, Alarm, has_changed, leg_alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
-from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recordings.findings import Finding

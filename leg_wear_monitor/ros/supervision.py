@@ -10,9 +10,8 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
-from leg_wear_monitor.monitor.alarms import Alarm, amount
+from leg_wear_monitor.monitor.alarms import Alarm, amount, leg_alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.judgement import leg_alarm
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
 from leg_wear_monitor.monitor.status import alarms_status, verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings

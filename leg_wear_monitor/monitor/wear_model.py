@@ -1,29 +1,35 @@
-"""The wear model of this leg: the twin, its wear in the ledger, its growth, measurements and forecast."""
+"""The wear model of this leg: twin, wear in the ledger, growth, forecast, and reports of gait cycles."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.files import with_same_fields
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
+from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import GROUND
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 
-class CountedLeg:
+class WearModel:
     """The wear model of this leg; observers read it, and correct it.
 
     Parameters
@@ -111,3 +117,72 @@ class CountedLeg:
         stamp_ns = self.twin.intake.followed_stamp_ns
         self.accounting.note(IdentifiedLeg(stamp_ns, tuple(self.mechanism.bodies), found))
         self.grows_anew(self.clearance_joints)
+
+    def report(
+        self,
+        statistics: CycleStatistics,
+        forecast: Forecast,
+        seen: Sequence[ClearanceEstimate] | None,
+        estimates: Sequence[KnownClearance | None],
+    ) -> CycleReport:
+        """Report of a gait cycle.
+
+        Parameters
+        ----------
+        statistics : CycleStatistics
+        forecast : Forecast
+        seen : sequence of ClearanceEstimate or None
+            Clearances by encoders; None without encoders.
+        estimates : sequence of (KnownClearance or None)
+            The surest estimate of each clearance.
+        """
+        torque, predicted_nm = statistics.torque, statistics.torque.predicted_rms_nm
+        mismatch = float(torque.unexplained_rms_nm / predicted_nm) if predicted_nm > 0.0 else math.nan
+        joints = range(len(self.clearance_joints))
+        return with_same_fields(
+            CycleReport,
+            torque,
+            statistics,
+            cycle=self.accounting.cycles,
+            joints=tuple(
+                self._joint_report(k, statistics, forecast.joints[k], seen[k] if seen else None, estimates[k])
+                for k in joints
+            ),
+            torque_samples=torque.samples,
+            measured_torque_rms_nm=float(torque.measured_rms_nm),
+            predicted_torque_rms_nm=float(predicted_nm),
+            residual_torque_rms_nm=float(torque.residual_rms_nm),
+            torque_mismatch=mismatch,
+            forecast=forecast.leg,
+        )
+
+    def _joint_report(
+        self,
+        k: int,
+        statistics: CycleStatistics,
+        forecast: JointForecast,
+        seen: ClearanceEstimate | None,
+        estimate: KnownClearance | None,
+    ) -> JointReport:
+        joint, rate = self.clearance_joints[k], growth_rate(self.growth[k])
+        mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
+        rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
+        error_m = rate.error_m(self.model_error.relative(k, rate.per_cycle_m)) if rate else None
+        return JointReport(
+            joint=joint,
+            clearance_m=float(statistics.clearance_mean_m[k]),
+            clearance_max_m=float(statistics.clearance_max_m[k]),
+            growth_m_per_cycle=rate.per_cycle_m if rate else None,
+            growth_mps=rate.per_second_m if rate else None,
+            growth_error_m_per_cycle=error_m,
+            forecast=forecast,
+            seen=seen,
+            measured=self.measured[k],
+            peak_force_n=float(statistics.peak_force_n[k]),
+            p99_force_n=p99_n,
+            mean_force_n=mean_n,
+            impacts=int(statistics.impacts[k]),
+            load=self.bushings[joint].load(mean_n, p99_n, rubbing_w),
+            estimated_m=estimate.clearance_m if estimate else None,
+            estimated_sigma_m=estimate.sigma_m if estimate else None,
+        )

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin import CRANK, KINDS
+from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import (
     AVERAGE,
     BRIDGE_LIMIT_S,
@@ -307,10 +307,11 @@ def last_walk(samples: Samples, cadence: Cadence, longest_gap_s: float) -> Walk:
     origin_ns = int(np.median(sound["stamp_ns"])) if len(sound) else 0
     longest_ns = int(_LONGEST * MOST_TURNS * 60.0e9 / abs(cadence.commanded_rpm))
     sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # stray stamps are left out
-    crank = _series(sound[sound["kind"] == CRANK], "crank_angle_rad", origin_ns)
+    crank = _series(of_crank(sound), "crank_angle_rad", origin_ns)
     crank = attrs.evolve(crank, value=np.asarray(np.unwrap(crank.value)))
     first, turns, why = _turns(crank, cadence, longest_gap_s)
-    torque = _series(sound, "torque_nm", origin_ns)
+    is_possible = np.abs(sound["torque_nm"]) <= KINDS[TORQUE].largest
+    torque = _series(sound[is_possible], "torque_nm", origin_ns)
     return _from(crank.time_s[first], turns, crank, torque) if turns else Walk(0, why, crank, torque)
 
 

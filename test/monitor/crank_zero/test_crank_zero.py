@@ -86,9 +86,9 @@ UNTOLD = {
         "does not fit this leg",
     ),
     "wrong sign": (lambda one: with_torque(one, np.negative), 60.0, "does not fit this leg"),
-    "symmetric": (symmetric, 60.0, "does not fit this leg|explain the drive torque nearly alike"),
+    "symmetric": (symmetric, 60.0, "does not fit this leg|almost equally well"),
     "few": (lambda one: np.delete(one, np.flatnonzero(one["kind"] != CRANK)[::10].repeat(9) + 2 * np.tile(
-        np.arange(1, 10), len(one) // 20)), 60.0, "samples in 4 turns. Expected 25 a turn"),
+        np.arange(1, 10), len(one) // 20)), 60.0, "samples in 4 turns"),
     "standing": (standing, 60.0, "the leg stands"),
     "another cadence": (lambda one: one, 80.0, "at 60 rpm; the commanded cadence is 80 ± 6 rpm"),
     "backwards": (lambda one: one, -60.0, "the leg walks at 60 rpm; the commanded cadence is -60 ± 6 rpm"),

@@ -15,10 +15,10 @@ import numpy as np
 
 JOINTS = ("A", "B", "G", "I", "J")
 NONE, SEVERAL, MASS, FRICTION, LOAD, UNKNOWN = "none", "several", "mass", "friction", "load", "unknown"
-NOT_OBSERVABLE = "not observable"
+NOT_OBSERVABLE, SOME = "not observable", "some joint"
 # Priors: of a change at all within the window, and of each cause of one
 CHANGED = 1.0e-4
-CAUSES = {**dict.fromkeys(JOINTS, 0.12), SEVERAL: 0.15, MASS: 0.1, FRICTION: 0.1, LOAD: 0.05}
+CAUSES = {**dict.fromkeys(JOINTS, 0.15), SEVERAL: 0.05, MASS: 0.08, FRICTION: 0.07, LOAD: 0.05}
 NAMED = 0.95  # posterior probability from which a cause is named
 WIDTHS = 14
 # usual drifts of a drive: its scale, its offset (over the torque's size), its lag [rad], its load friction
@@ -101,8 +101,12 @@ class Network:
 
     def leg(self, baseline: np.ndarray, context: np.ndarray) -> np.ndarray:
         """Description of a leg by its baseline (160,) and how its crank turns (7,)."""
-        x = np.concatenate([(baseline - self.w["mean"]) / self.w["std"], context])
+        x = np.concatenate([self.place(baseline), context])
         return self._dense("enc2", _silu(self._dense("enc1", x)))
+
+    def place(self, baseline: np.ndarray) -> np.ndarray:
+        """Components of a baseline, about 1 in size over the training legs."""
+        return np.asarray(((baseline - self.w["mean"]) / self.w["std"]) @ self.w["near_basis"])
 
     def answers(self, leg: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, ...]:
         """Mean (h, K), systematic variance and columns (h, K, r), and scatter of changes (h, 14)."""
@@ -167,8 +171,8 @@ class KnownLeg:
         self._columns = np.concatenate([columns, np.broadcast_to(drifts.T, (*self.mean.shape, 4))], axis=2)
         self.peak_n = network.peak_n(leg)
         # distance from the training legs, over the distance that one of a hundred held-out legs exceeds
-        place = ((baseline - w["mean"]) / w["std"]) @ w["near_basis"]
-        near = np.sort(np.sqrt(np.mean(np.square(w["near"] - place), axis=1)))[:3].mean()
+        apart = np.sqrt(np.mean(np.square(w["near"] - network.place(baseline)), axis=1))
+        near = np.sort(apart)[:3].mean()
         self.distance = float(near / w["far"])
         self._ready: dict[int, tuple[np.ndarray, ...]] = {}
 
@@ -193,12 +197,16 @@ class KnownLeg:
         explained = np.einsum("hrk,hk->hr", solved[which], rest)
         return np.asarray((inverse[which] * rest**2).sum(1) - (explained**2).sum(1))
 
+    def weights(self, squares: np.ndarray, n: int) -> np.ndarray:
+        """Probability (h,) of each hypothesis, up to a factor, by squares (h,) of n gait cycles."""
+        log_weight = self.tried.log_prior - 0.5 * (squares + self._of_cycles(n)[2])
+        return np.asarray(np.exp(log_weight - log_weight.max()))
+
     def posterior(self, present: np.ndarray, n: int) -> Posterior:
         """What changed, by the mean signature (160,) of n gait cycles."""
         w, tried = self.network.w, self.tried
         squares = self.squares(present, n)
-        log_weight = tried.log_prior - 0.5 * (squares + self._of_cycles(n)[2])
-        weight = np.exp(log_weight - log_weight.max())
+        weight = self.weights(squares, n)
         each = np.bincount(tried.cause, weight, len(tried.names)) / weight.sum()
         probability = dict(zip(tried.names, each.tolist(), strict=True))
         joint = max(JOINTS, key=lambda name: probability[name])
@@ -216,5 +224,5 @@ class KnownLeg:
         elif square > w["square_limit"] or outside > w["outside_limit"]:
             found = UNKNOWN
         elif found in JOINTS and probability[found] < NAMED:
-            found = "some joint" if probability[NONE] < 1.0 - NAMED else NONE
+            found = SOME if probability[NONE] < 1.0 - NAMED else NONE
         return Posterior(probability, found, opening, sigma, square, outside)

@@ -1,7 +1,8 @@
 """Drives and torque sensors on stored legs, and the signatures that they show.
 
 A signature has 160 entries: the mean torque in 80 phases over the torque's size, and the logarithm of the
-roughness over this size. `python signals.py LEGS FILE [--draws 12]` draws drives on all training legs.
+roughness over this size. `python signals.py LEGS FILE [--draws 12]` draws drives on all training legs
+that the file does not have yet.
 """
 
 import argparse
@@ -125,12 +126,19 @@ class Stored:
         self.size_nm = torque_size(LINKAGE, speed)
         self.context = context_of(self.profile)
         self.sensor = TorqueSensor(1.0 / RATE_HZ, TURN / speed, self.size_nm)
+        self._even = np.linspace(0.0, TURN, POINTS, endpoint=False)
+        self._ripple = self.profile.angles(self._even) - self._even
 
     @classmethod
     def read(cls, path: Path) -> "Stored":
         """The leg of a file."""
         with np.load(path) as file:
             return cls({name: file[name] for name in file.files})
+
+    def angles(self, time_s: np.ndarray) -> np.ndarray:
+        """Crank angles (n,) [rad] at some times."""
+        even = self.profile.speed * time_s
+        return np.asarray(even + np.interp(even, self._even, self._ripple, period=TURN))
 
     def torque(self, state: int) -> np.ndarray:
         """Torque (cycles, POINTS) of a state [N m]."""
@@ -141,7 +149,7 @@ class Stored:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times [s], crank angles [rad], torques and steps [N m] (n,) of a sensor behind a drive."""
         step_s, points = TURN / self.profile.speed / POINTS, torque.size
-        grid = self.profile.angles(self.profile.speed * step_s * (np.arange(points) + 0.5))
+        grid = self.angles(step_s * (np.arange(points) + 0.5))
         received = drive.received(torque.ravel(), grid, step_s, self.size_nm)
         impulse = np.concatenate([[0.0], np.cumsum(received) * step_s])
         between = clock / RATE_HZ
@@ -155,7 +163,7 @@ class Stored:
             value = drive.quantum_nm * np.round(value / drive.quantum_nm)
         there = rng.random(len(value)) >= drive.loss
         step = np.where(np.roll(there, 1), np.diff(value, prepend=np.nan), np.nan)
-        angle = self.profile.angles(self.profile.speed * time_s)
+        angle = self.angles(time_s)
         return time_s[there], angle[there], value[there], step[there]
 
     def signatures(self, state: int, drive: Drive, rng: np.random.Generator) -> np.ndarray:
@@ -244,12 +252,20 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--draws", type=int, default=12)
     options = parser.parse_args()
-    found, seeds = [], []
+    known: dict[str, np.ndarray] = {}
+    if options.file.exists():
+        with np.load(options.file) as file:
+            known = {name: file[name] for name in file.files}
+    seeds, found = known.pop("seed", np.zeros(0, int)).tolist(), []
     for path in sorted(options.legs.glob("[0-9]????.npz")):
-        seeds.append(int(path.stem))
-        found.append(examples(Stored.read(path), options.draws, np.random.default_rng([seeds[-1], 9])))
-    np.savez(options.file, seed=seeds, **{key: np.array([one[key] for one in found]) for key in found[0]})
-    print(f"{len(found)} legs")
+        if int(path.stem) not in seeds:
+            seeds.append(int(path.stem))
+            found.append(examples(Stored.read(path), options.draws, np.random.default_rng([seeds[-1], 9])))
+    new = {key: np.array([one[key] for one in found]) for key in found[0]}
+    np.savez(
+        options.file, seed=seeds, **{k: np.concatenate([known.get(k, v[:0]), v]) for k, v in new.items()}
+    )
+    print(f"{len(seeds)} legs")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Train the conditional likelihood on the examples of `signals.py`; needs torch.
 
-`python train.py EXAMPLES WEIGHTS [--part 0.5] [--epochs 40]` holds one of ten legs back, to stop and to
+`python train.py EXAMPLES WEIGHTS [--part 0.5] [--epochs 14]` holds one of ten legs back, to stop and to
 calibrate. With `--part`, it learns from this part of the other legs alone.
 """
 
@@ -13,8 +13,8 @@ import torch
 from model import WIDTHS, KnownLeg, Network, drift_columns, features_of, hypotheses
 from torch import nn
 
-HIDDEN, LEG, COMPONENTS, COLUMNS = 128, 32, 64, 4
-NEAR, OUTSIDE = 20, 40  # components of baselines that are compared; components that show no known change
+HIDDEN, LEG, COMPONENTS, COLUMNS = 128, 16, 64, 4
+PLACE, OUTSIDE = 24, 40  # components of baselines; components of signatures that show no known change
 
 
 class Likelihood(nn.Module):
@@ -22,16 +22,17 @@ class Likelihood(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.enc1, self.enc2 = nn.Linear(167, HIDDEN), nn.Linear(HIDDEN, LEG)
+        self.enc1, self.enc2 = nn.Linear(PLACE + 7, HIDDEN), nn.Linear(HIDDEN, LEG)
         self.dec1, self.dec2 = nn.Linear(LEG + 3 * WIDTHS, HIDDEN), nn.Linear(HIDDEN, HIDDEN)
         self.mean_head, self.columns = nn.Linear(HIDDEN, COMPONENTS), nn.Linear(HIDDEN, COMPONENTS * COLUMNS)
         self.systematic, self.scatter = nn.Linear(HIDDEN, COMPONENTS), nn.Linear(HIDDEN, COMPONENTS)
-        self.peak, self.dropped = nn.Linear(LEG, 1), nn.Dropout(0.1)
+        self.peak = nn.Linear(LEG, 1)
         with torch.no_grad():
             self.columns.weight *= 0.3
 
     def forward(self, leg, change):
-        z = self.enc2(nn.functional.silu(self.enc1(self.dropped(leg))))
+        leg = leg + 0.1 * torch.randn_like(leg) if self.training else leg
+        z = self.enc2(nn.functional.silu(self.enc1(leg)))
 
         def decoded(features):
             return nn.functional.silu(self.dec2(nn.functional.silu(self.dec1(torch.cat([z, features], 1)))))
@@ -67,7 +68,7 @@ def whitened(data, legs: np.ndarray) -> dict[str, np.ndarray]:
     base = data["base"][legs].reshape(-1, 160)
     mean, std = base.mean(0), base.std(0) + 0.02
     _, _, near = np.linalg.svd((base - mean) / std, full_matrices=False)
-    near_basis = near[:NEAR].T
+    near_basis = near[:PLACE].T
     near_basis = near_basis / (((base - mean) / std) @ near_basis).std(0)
     one_each = data["base"][legs][:, 0]
     return {
@@ -81,13 +82,14 @@ def tensors(data, legs: np.ndarray, parts: dict[str, np.ndarray]):
     base, present = data["base"][legs], data["present"][legs]
     number, draws, states = present.shape[:3]
     context = np.broadcast_to(data["context"][legs][:, None], (number, draws, 7))
-    leg = np.concatenate([(base - parts["mean"]) / parts["std"], context], axis=2)
+    place = ((base - parts["mean"]) / parts["std"]) @ parts["near_basis"]
+    leg = np.concatenate([place, context], axis=2)
     drifts = np.einsum("ldfc,fk->ldkc", drift_columns(base), parts["basis"])
     target = (present - base[:, :, None]) @ parts["basis"]
     change = np.broadcast_to(features_of(data["change"][legs])[:, None], (number, draws, states, 3 * WIDTHS))
     peak = np.broadcast_to(data["peak_n"][legs][:, None] / 100.0, (number, draws))
     which = np.repeat(np.arange(number * draws), states)
-    found = [leg.reshape(-1, 167), drifts.reshape(-1, COMPONENTS, 4), peak.reshape(-1)]
+    found = [leg.reshape(-1, PLACE + 7), drifts.reshape(-1, COMPONENTS, 4), peak.reshape(-1)]
     per_cycle = (1.0 / data["counts"][legs]).sum(-1).reshape(-1)
     rows = [target.reshape(-1, COMPONENTS), change.reshape(-1, 3 * WIDTHS), per_cycle]
     return [
@@ -182,7 +184,7 @@ def main() -> None:
     parser.add_argument("examples", type=Path)
     parser.add_argument("weights", type=Path)
     parser.add_argument("--part", type=float, default=1.0)
-    parser.add_argument("--epochs", type=int, default=40)
+    parser.add_argument("--epochs", type=int, default=14)
     options = parser.parse_args()
     torch.set_num_threads(1)
     with np.load(options.examples) as file:

@@ -18,7 +18,7 @@ def weights(path: Path) -> Path:
     """A network that nobody trained."""
     rng = np.random.default_rng(1)
     shapes = {
-        "enc1": (HIDDEN, 167), "enc2": (LEG, HIDDEN), "dec1": (HIDDEN, LEG + 42), "dec2": (HIDDEN, HIDDEN),
+        "enc1": (HIDDEN, 3 + 7), "enc2": (LEG, HIDDEN), "dec1": (HIDDEN, LEG + 42), "dec2": (HIDDEN, HIDDEN),
         "mean_head": (COMPONENTS, HIDDEN), "columns": (COMPONENTS * COLUMNS, HIDDEN),
         "systematic": (COMPONENTS, HIDDEN), "scatter": (COMPONENTS, HIDDEN), "peak": (1, LEG),
     }  # fmt: skip

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from legs import LEG, NEW_M
-from model import JOINTS, NONE, SOME, KnownLeg, Network, hypotheses
+from model import JOINTS, NONE, SOME, KnownLeg, Network, cause_of, hypotheses
 from signals import RATE_HZ, Drive, Stored, changes_of
 
 KNOWN, BLOCK = 40, 10  # gait cycles of a baseline, and neighbouring ones that are drawn together
@@ -23,7 +23,8 @@ ALL |= {"quantum_nm": 0.1, "loss": 0.02}
 DRIVES = {
     "clean": {}, "lag 10 ms": {"lag_s": 0.01}, "lag 20 ms": {"lag_s": 0.02}, "lag 30 ms": {"lag_s": 0.03},
     "low-pass 20 Hz": {"hz": 20.0}, "low-pass 35 Hz": {"hz": 35.0},
-    "load friction 0.1": {"load_friction": 0.1}, "load friction 0.3": {"load_friction": 0.3}, "Coulomb 1 N m": {"coulomb_nm": 1.0},
+    "load friction 0.1": {"load_friction": 0.1}, "load friction 0.3": {"load_friction": 0.3},
+    "Coulomb 1 N m": {"coulomb_nm": 1.0},
     "torque constant −10 %": {}, "cogging 3 %": {"cogging": 0.03}, "steps of 0.1 N m": {"quantum_nm": 0.1},
     "2 % lost": {"loss": 0.02}, "all": ALL,
 }  # fmt: skip
@@ -46,7 +47,7 @@ def drives_of(name: str) -> tuple[Drive, Drive]:
 
 
 class Case(NamedTuple):
-    """A change of a stored leg: its row of the table, its state, the open joints, and the opened size."""
+    """A change of a stored leg: its row of the table, its state, the single open joint, and its size."""
 
     row: str
     state: int
@@ -58,12 +59,11 @@ def cases_of(stored: Stored, drive: str) -> Iterator[Case]:
     """All changes of a leg behind a drive."""
     where = f"ground {float(stored.truth['peak_n']):.0f} N: " if stored.truth["peak_n"] else ""
     for state, change in enumerate(changes_of(stored.truth)[1:], 1):
-        opened = tuple(joint for joint, one in zip(JOINTS, change, strict=False) if one > 0.04)
-        size_m = float(stored.truth["clearance_m"][state].max())
-        rows = {0: "friction" if abs(change[12]) > 0.01 else "mass", 1: drive}
-        if len(opened) == 1 and drive == "clean":
-            rows[1] = f"clean, {1e3 * size_m:.2f} mm"
-        yield Case(where + rows.get(len(opened), "several"), state, opened, size_m)
+        cause, size_m = cause_of(change), float(stored.truth["clearance_m"][state].max())
+        row = drive if cause in JOINTS else cause
+        if row == "clean":
+            row = f"clean, {1e3 * size_m:.2f} mm"
+        yield Case(where + row, state, (cause,) if cause in JOINTS else (), size_m)
 
 
 class Counts:

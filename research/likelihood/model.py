@@ -24,6 +24,8 @@ WIDTHS = 14
 # usual drifts of a drive: its scale, its offset (over the torque's size), its lag [rad], its load friction
 DRIFTS = (0.06, 0.04, 0.006, 0.03)
 PHASES = 80
+FREEDOM = 8.0  # degrees of freedom of the t distribution: some legs are predicted worse than others
+OUTSIDE_FLOOR = 0.3  # variance of legs in components that show no known change, in that of a gait cycle
 
 
 class Hypotheses(NamedTuple):
@@ -65,6 +67,14 @@ def hypotheses(changed: float = CHANGED, causes: dict[str, float] | None = None)
     log_prior = [np.log(prior[name] / size) for name, size in zip(names, sizes, strict=True)]
     cause = np.repeat(np.arange(len(names)), sizes)
     return Hypotheses(names, cause, np.vstack(list(sets.values())), np.repeat(log_prior, sizes))
+
+
+def cause_of(change: np.ndarray) -> str:
+    """Name of the cause of a change (14,)."""
+    opened, others = np.flatnonzero(change[:5] > 0.04), np.abs(change[5:]) > 0.01
+    if len(opened):
+        return JOINTS[opened[0]] if len(opened) == 1 else SEVERAL
+    return LOAD if others[8] else FRICTION if others[7] else MASS if others.any() else NONE
 
 
 def drift_columns(baseline: np.ndarray) -> np.ndarray:
@@ -114,9 +124,12 @@ class Network:
         x = np.hstack([np.tile(leg, (len(change), 1)), features_of(change)])
         x = _silu(self._dense("dec2", _silu(self._dense("dec1", x))))
         mean = self._dense("mean_head", x)
-        columns = self._dense("columns", x).reshape(len(x), self.basis.shape[1], -1)
+        mean -= mean[-1]
+        columns = 0.3 * self._dense("columns", x).reshape(*mean.shape, -1)
         systematic, scatter = (np.exp(self._dense(name, x)) for name in ("systematic", "scatter"))
-        return mean[:-1] - mean[-1], systematic[:-1], columns[:-1], scatter[:-1]
+        each, together = np.exp(self.w["size_errors"])
+        columns = np.concatenate([columns, together * mean[:, :, None]], axis=2)
+        return mean[:-1], (systematic + each**2 * mean**2)[:-1], columns[:-1], scatter[:-1]
 
     def peak_n(self, leg: np.ndarray) -> float:
         """Largest vertical force of the ground [N], by the baseline."""
@@ -180,10 +193,8 @@ class KnownLeg:
         """Inverse diagonal, columns in it, and logarithm of the determinant for a mean of n gait cycles."""
         if n not in self._ready:
             variance = self._systematic + self._scatter * (1.0 / n + 1.0 / self.cycles)
-            variance = variance * self.network.w["inflation"]
-            columns = self._columns * np.sqrt(self.network.w["inflation"])
-            within = columns / variance[:, :, None]
-            capacity = np.eye(columns.shape[2]) + np.einsum("hkr,hks->hrs", columns, within)
+            within = self._columns / variance[:, :, None]
+            capacity = np.eye(within.shape[2]) + np.einsum("hkr,hks->hrs", self._columns, within)
             lower = np.linalg.cholesky(capacity)
             solved = np.linalg.solve(lower, within.transpose(0, 2, 1))
             log_size = np.log(variance).sum(1) + 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(1)
@@ -199,7 +210,9 @@ class KnownLeg:
 
     def weights(self, squares: np.ndarray, n: int) -> np.ndarray:
         """Probability (h,) of each hypothesis, up to a factor, by squares (h,) of n gait cycles."""
-        log_weight = self.tried.log_prior - 0.5 * (squares + self._of_cycles(n)[2])
+        log_size, inflation = self._of_cycles(n)[2], self.network.w["inflation"]
+        known = FREEDOM + self.mean.shape[1]
+        log_weight = self.tried.log_prior - 0.5 * (known * np.log1p(squares / inflation / FREEDOM) + log_size)
         return np.asarray(np.exp(log_weight - log_weight.max()))
 
     def posterior(self, present: np.ndarray, n: int) -> Posterior:
@@ -216,8 +229,8 @@ class KnownLeg:
         opening = float(part @ size)
         sigma = float(np.sqrt(part @ np.square(size - opening) + (size[1] - size[0]) ** 2 / 12.0))
         square = float(squares.min()) / len(self.network.basis[0])
-        left = (present - self.baseline) @ w["outside"]
-        outside = float(np.mean(np.square(left))) / (float(w["outside_floor"]) + 1.0 / n + 1.0 / self.cycles)
+        left = np.square((present - self.baseline) @ w["outside"])
+        outside = float(np.mean(left)) / (OUTSIDE_FLOOR + 1.0 / n + 1.0 / self.cycles)
         found = max(probability, key=lambda name: probability[name])
         if self.distance > 1.0:
             found = NOT_OBSERVABLE

@@ -19,8 +19,8 @@ def weights(path: Path) -> Path:
     rng = np.random.default_rng(1)
     shapes = {
         "enc1": (HIDDEN, 3 + 7), "enc2": (LEG, HIDDEN), "dec1": (HIDDEN, LEG + 42), "dec2": (HIDDEN, HIDDEN),
-        "mean_head": (COMPONENTS, HIDDEN), "columns": (COMPONENTS * COLUMNS, HIDDEN),
-        "systematic": (COMPONENTS, HIDDEN), "scatter": (COMPONENTS, HIDDEN), "peak": (1, LEG),
+        "mean_head": (COMPONENTS, HIDDEN), "scatter": (COMPONENTS, HIDDEN), "peak": (1, LEG),
+        "systematic": (COMPONENTS, HIDDEN), "columns": (COMPONENTS * COLUMNS, HIDDEN),
     }  # fmt: skip
     arrays = {f"{name}.weight": rng.standard_normal(shape) for name, shape in shapes.items()}
     arrays |= {f"{name}.bias": np.zeros(shape[0]) for name, shape in shapes.items()}
@@ -30,7 +30,8 @@ def weights(path: Path) -> Path:
     basis = np.linalg.qr(rng.standard_normal((160, COMPONENTS + 5)))[0]
     arrays |= {"basis": basis[:, :COMPONENTS], "outside": basis[:, COMPONENTS:], "near": np.zeros((4, 3))}
     arrays |= {"mean": np.zeros(160), "std": np.ones(160), "near_basis": np.zeros((160, 3))}
-    limits = {"inflation": 1, "square_limit": 3, "outside_limit": 3, "far": 1, "outside_floor": 1}
+    arrays["size_errors"] = np.full(2, -3.0)
+    limits = {"inflation": 1, "square_limit": 3, "outside_limit": 3, "far": 1}
     np.savez(path, **arrays, **{name: np.float32(one) for name, one in limits.items()})
     return path
 

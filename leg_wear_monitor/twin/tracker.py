@@ -369,7 +369,7 @@ def track(models, states, arrivals, queue, samples, steps):
     return n
 
 
-_CHUNK = 256  # samples per call of the kernel
+_CHUNK = 1024  # samples per call of the kernels: an evaluation period at 2 kHz takes one
 _STEPS_A_SAMPLE = 7  # largest number of steps per sample
 
 

@@ -155,8 +155,8 @@ class ReferenceRun(Generic[FoundT]):
     """Simulates legs while evaluation periods pass: the sensor signals of these legs are its reference.
 
     Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: its result
-    depends on the number of calls alone, and a machine that is busy for a while catches up before. There is
-    one thread less than numba may use (NUMBA_NUM_THREADS).
+    depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
+    as many threads as numba may use (NUMBA_NUM_THREADS).
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class ReferenceRun(Generic[FoundT]):
         self._legs: tuple[Leg, ...] = ()
         self._done: tuple[NDArray[Any], ...] = ()
         self._periods = 0
-        self._threads = max(1, numba.config.NUMBA_NUM_THREADS - 1)  # one core is for the samples
+        self._threads = numba.config.NUMBA_NUM_THREADS
         self._pool = ThreadPoolExecutor(self._threads, "reference")
         self._ahead: list[Future[NDArray[Any] | None]] = []
         self._wanted = object()  # replaced as soon as no caller waits for the threads' simulations

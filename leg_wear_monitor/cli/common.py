@@ -102,7 +102,7 @@ limit_option: Option = option(
     default=6.0e-4,
 )
 config_option: Option = path_option(
-    "--config", "FILE", "Parameter file of the node.  [default: the one that comes with the package]"
+    "--config", "FILE", "Parameter file of the node.  [default: config/monitor.yaml of the package]"
 )
 ledger_option: Option = file_option(
     "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
@@ -110,8 +110,8 @@ ledger_option: Option = file_option(
 node_option: Option = option(
     "--node",
     "NAME",
-    "Full name of a running monitor to enter it into, such as /left/leg_wear_monitor; with --config, of the "
-    "node whose parameters and ledger are used.",
+    "Full name of a running monitor, such as /left/leg_wear_monitor. With --config: of the node whose "
+    "parameters and ledger are used.",
 )
 section_option: Option = option(
     "--node",

@@ -126,7 +126,7 @@ def print_replay(result: "ReplayResult", wall_s: float, files: Mapping[str, Path
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}; {result.crank_samples} crank "
         f"and {result.torque_samples} torque samples, {len(result.history)} gait cycles, "
-        f"{result.evidence.doubtful} of them do not fit this leg"
+        f"{result.evidence.doubtful} of them unlike this leg"
     )
     if words := walked_words(monitor.walked):
         console.print(words, soft_wrap=True)
@@ -158,7 +158,9 @@ def print_state(
     if state.clearances:
         console.print()
         console.print(_joints(state, joint_words))
-        console.print("life: remaining hours of walking, not exceeded with 10 and 50 % probability")
+        console.print(
+            "life: remaining hours of walking, exceeded with a probability of 90 % (p10) and 50 % (p50)"
+        )
     console.print()
     raised = [alarm for alarm in state.alarms.now if alarm.level]
     for alarm in raised:

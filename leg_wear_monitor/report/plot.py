@@ -159,7 +159,7 @@ def _plane(trace: Trace, name: str, kind: str, axes: Axes) -> Axes:
         place, rate = joint.eccentricity_m[::step, i], joint.eccentricity_rate_mps[::step, i]
         axes.plot(1.0e3 * place, 1.0e3 * rate, color=colour, label=f"{name}, {axis}", **look)
     axes.xaxis.set_major_locator(MaxNLocator(5))  # more labels run into each other at this width
-    return _finished(axes, "place in the bushing [mm]", "rate [mm/s]")
+    return _finished(axes, "eccentricity [mm]", "eccentricity rate [mm/s]")
 
 
 def _wear(result: SimulationResult, name: str, axes: Axes) -> Axes:

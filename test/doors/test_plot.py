@@ -14,8 +14,8 @@ LABELS = {
     "displacement": "toe displacement error [mm]",
     "velocity": "toe velocity error [m/s]",
     "acceleration": "toe acceleration error [m/s²]",
-    "portrait": "rate [mm/s]",
-    "poincare": "rate [mm/s]",
+    "portrait": "eccentricity rate [mm/s]",
+    "poincare": "eccentricity rate [mm/s]",
 }
 
 

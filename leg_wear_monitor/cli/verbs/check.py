@@ -44,10 +44,10 @@ _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "nump
 def check(configs: tuple[str, ...]) -> int:
     """Check mechanism, parameter and fleet files; without a file, the installation and its own files.
 
-    Prints a summary of each correct file, and a line on stderr for each fault. A value that is probably in
-    another unit causes a warning; the exit code is then 1. Tables (.csv, .parquet) are read with the columns
-    and units of the parameter file before them: check monitor.yaml leg.csv. Without a parameter file, the
-    command proposes one: check leg.csv.
+    Prints a summary of each correct file, and a line on stderr for each fault. A value that is probably in a
+    wrong unit causes a warning and exit code 1. To check a table (.csv, .parquet), name its parameter file
+    first: check monitor.yaml leg.csv. Without a parameter file, the command proposes the parameters: check
+    leg.csv.
     """
     with warnings.catch_warnings(record=True) as doubted:
         warnings.simplefilter("always", ConfigWarning)
@@ -337,13 +337,13 @@ def _in_full(pair: "Material") -> list[str]:
 # ``leg-wear-monitor cache``: compiled code on this machine.
 
 
-@click.command(short_help="Measure, fill or remove the compiled code on this machine.")
+@click.command(short_help="Show, fill or remove the compiled code on this machine.")
 @click.option(
     "--fill", is_flag=True, help="Compile the kernels now instead of at the first start: about two minutes."
 )
 @click.option("--clear", is_flag=True, help="Remove the compiled code; the next start compiles it again.")
 def cache(fill: bool, clear: bool) -> None:
-    """Print the place and the size of the compiled code; or remove it, or compile it ahead.
+    """Show the directory and the size of the compiled code, remove it, or compile it ahead of time.
 
     After `--fill` the first simulation, replay and start of a node are as fast as later ones.
 

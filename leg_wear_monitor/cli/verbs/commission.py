@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 @common.path_option(
     "--config",
     "FILE",
-    "Parameter file that names the mechanism; parameters that are not measured are kept.  "
-    "[default: the one that comes with the package]",
+    "Parameter file that names the mechanism; other parameters in it are kept.  "
+    "[default: config/monitor.yaml of the package]",
 )
 @common.section_option
 @common.file_option(
     "--out",
     "FILE",
-    "Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
-    "certain, and a file that exists is kept unless everything is determined and fits.",
+    "File for the proposed parameters, such as monitor.yaml. It is not written if a choice is uncertain. "
+    "An existing file is replaced only if all parameters are determined and fit.",
 )
 @common.file_option(
     "--reference",
     "FILE",
-    "Simulate a torque reference of the leg under the recorded motion of its crank, about a minute, and "
-    "write it, such as leg.reference.npz; the proposed parameters name it.",
+    "Simulate a torque reference for the recorded motion of the crank (about a minute) and write it, such "
+    "as leg.reference.npz; the proposed parameters name the file.",
 )
 @common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: all are tried]")
 @common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: all are tried]")
@@ -160,10 +160,10 @@ def reference(
 ) -> None:
     """Simulate the torque reference of a leg, which the diagnosis compares with.
 
-    MECHANISM is a mechanism file, or the name of one that comes with the package; by default, the one of the
-    parameter file. The crank turns steadily, the leg is new. A leg whose diagnosis.reference names the file
-    needs no simulation while it walks at this cadence, with --load under such a force, with load.model ground
-    or measured.
+    MECHANISM is a mechanism file, or the name of one that comes with the package; by default, the mechanism
+    of the parameter file. The crank turns steadily, the leg is new. If diagnosis.reference names the file,
+    the monitor does not simulate while the leg walks at this cadence. A reference with --load is for this
+    force, and load.model ground or measured.
     """
     common.check_file("--out", out)
     from leg_wear_monitor.mechanism.loader import load_mechanism

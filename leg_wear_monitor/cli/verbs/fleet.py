@@ -43,9 +43,9 @@ def update(
 ) -> int:
     """Replay the new recordings of each leg into the ledger of this leg, in the order of time.
 
-    Writes fleet.json, fleet.csv and report.html. Time that is in a ledger is not counted again. Each finished
-    recording of an interrupted update is kept, and the next update goes on from there. Exits with 1 if a
-    recording was not counted as a whole, or if a leg could not be updated.
+    Writes fleet.json, fleet.csv and report.html. Time that is already in a ledger is skipped. After an
+    interruption, the next update continues. Exits with 1 if a recording could not be added completely, or if
+    a leg could not be updated.
     """
     from leg_wear_monitor.fleet.description import load_fleet
     from leg_wear_monitor.fleet.update import update_fleet
@@ -80,7 +80,7 @@ def update(
 @common.out_option(_OUT)
 @_fresh_option
 def report(path: Path, out: Path | None, fresh_days: float) -> None:
-    """Write DIR/report.html from fleet.json, as the last update left it."""
+    """Write DIR/report.html again from fleet.json."""
     from leg_wear_monitor.fleet.description import fleet_directory
     from leg_wear_monitor.fleet.overview import load_overview
 

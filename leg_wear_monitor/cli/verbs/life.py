@@ -48,8 +48,8 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.option(
     "--ensemble-size",
     "N",
-    "Number of lives for --json; lives after the first have different wear coefficients, from which the "
-    "forecast finds the effect of joints on each other.",
+    "Number of lives for --json. Lives after the first have different wear coefficients; they show the "
+    "forecast how joints affect each other.",
     type=click.IntRange(min=1),
     default=1,
 )
@@ -209,11 +209,11 @@ def design(
     json_file: Path | None,
     **options: Any,
 ) -> None:
-    """Find bushings with which each joint of a leg lasts the hours wanted.
+    """Find bushings with which each joint of a leg lasts the given hours.
 
-    One life of the leg under the duty gives forces and sliding over the clearance. From these follow the
-    lives of all pairs and sizes, by wear or by the maker's formula, and which of the maker's limits are
-    exceeded. Check a choice with the verb life.
+    One life of the leg under the duty gives forces and sliding over the clearance. They give the life of
+    every pair and size, by wear or by the maker's formula, and the maker's limits that are exceeded. Check a
+    choice with the verb life.
     """
     import attrs
 

@@ -267,10 +267,10 @@ _NODE = "/leg_wear_monitor"
     "--port", "PORT", "Port to listen on; 0 for any free port.", type=click.IntRange(0, 65535), default=8350
 )
 def dashboard(node: str, config: Path | None, host: str, port: int) -> int:
-    """Serve a page with the verdict, the leg and the trends, renewed while you look, until Ctrl-C.
+    """Serve a live page with the verdict, the leg and the trends, until Ctrl-C.
 
-    The page cannot change anything. It is served to this machine only, unless --host says otherwise: it has
-    no password. --config is needed for a leg with a mechanism file of its own.
+    The page cannot change anything. It has no password, so it is served to this machine only, unless --host
+    opens it. A leg with its own mechanism file needs --config.
     """
     import_module("tornado")
     from leg_wear_monitor.dashboard.server import listen

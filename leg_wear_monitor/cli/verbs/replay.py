@@ -74,7 +74,7 @@ def replay(
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
     Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
-    leg, if all of it is in the ledger already, or if the verdict is or an alarm was one of --fail-on.
+    leg, if all of it is in the ledger already, or if --fail-on matches the verdict or an alarm.
     """
     common.check_outputs(json_file, out)
     written, began, took = list[Path](), [0.0], [0.0]

@@ -36,7 +36,7 @@ NAMES = tuple(sorted(path.stem for path in (share_directory() / "config" / "stud
 )
 @click.argument("name", metavar="STUDY")
 @common.option("--mechanism", "FILE", "Leg to use instead of the leg in the study file.")
-@common.path_option("--out", "DIR", "Data and page.", required=True)
+@common.path_option("--out", "DIR", "Directory for data and page.", required=True)
 @common.workers_option
 @common.scheduler_option
 def study(name: str, mechanism: str | None, out: Path, workers: int | None, scheduler: str | None) -> int:
@@ -113,10 +113,10 @@ _OURS = b"leg-wear-monitor draw"  # near the start of a file that this verb writ
 def draw(mechanism: str, out: Path | None) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
 
-    The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
-    mechanism does not close, its bodies are drawn apart at the open joint, with the distance; where its crank
-    does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
-    1. Replaces a drawing of an earlier run, and no other file.
+    The HTML page moves the mechanism through its cycle; it is one file and needs no network. If the mechanism
+    does not close, the page shows the open joint and its distance. If the crank does not turn through, the
+    page shows its range and the bodies in line at its ends. The exit code is then 1. Replaces a drawing of an
+    earlier run, and no other file.
     """
     target = Path(f"{Path(mechanism).stem}.html") if out is None else out
     _check_target(target)
@@ -210,8 +210,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.IntRange(min=0),
     metavar="N",
     default=0,
-    help="Keep N samples per cycle, for --json and for the pictures of --out; from some hundred on, samples "
-    "take longer than the simulation.",
+    help="Keep N samples per cycle for --json and the pictures of --out. Several hundred samples take longer "
+    "than the simulation.",
 )
 @common.option(
     "--intervals",

@@ -92,10 +92,11 @@ def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
 @common.node_option
 @common.wait_option
 def acknowledge(config: Path | None, ledger: Path | None, node: str | None, wait_s: float) -> int:
-    """Acknowledge all alarms: those that have returned to normal clear, the others stay, marked as seen.
+    """Acknowledge all alarms. Alarms whose values are normal again clear.
 
-    The service ~/acknowledge_alarms does the same. The others clear when their values return. A running
-    monitor locks its ledger: name it with --node, or stop it first.
+    The service ~/acknowledge_alarms does the same. The other alarms stay, marked as acknowledged, and clear
+    when their values are normal again. A running monitor locks its ledger: name it with --node, or stop it
+    first.
     """
     if node is not None and config is None:
         common.check_alone(ledger=ledger)
@@ -127,10 +128,10 @@ def reset(
     wait_s: float,
     undo: bool,
 ) -> int:
-    """Enter that the parts of JOINT were replaced: its wear is 0 again, its history stays in the ledger.
+    """Enter a replaced part of JOINT: its wear starts at 0, and its history stays in the ledger.
 
-    JOINT is a name or a label, such as knee; with --node, a name. The alarms that rested on the former part
-    are acknowledged and clear. A running monitor locks its ledger: name it with --node, or stop it first.
+    JOINT is a name or a label, such as knee; with --node, a name. The alarms of the old part are acknowledged
+    and clear. A running monitor locks its ledger: name it with --node, or stop it first.
     """
     if node is not None and config is None:
         common.check_alone(ledger=ledger)
@@ -186,9 +187,10 @@ def measure(
 ) -> int:
     """Enter the measured mean radial clearance of JOINT, a name or a label such as knee, in millimetres.
 
-    Measure with a feeler gauge, a micrometer or a dial. A dial shows twice the radial clearance if the pin is
-    moved to and fro. A running monitor locks its ledger: name it with --node, or stop it first. The modelled
-    clearance stays as it is. Exit code 1 if the measurement contradicts the model or is at its limit.
+    Measure with a feeler gauge, a micrometer or a dial. A dial indicator shows twice the radial clearance if
+    you move the pin from side to side. A running monitor locks its ledger: name it with --node, or stop it
+    first. The modelled clearance does not change. Exit code 1 if the measurement contradicts the model or is
+    at its limit.
     """
     is_live = node is not None and config is None
     if is_live:

@@ -198,7 +198,7 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
         return "" if _is_changing(state) else f"a reference for it is begun in {_cycles(left, cycle_s)}"
     if state.commissioned is None and not state.changes:
         left = COMMISSIONING_CYCLES - len(state.cycles)
-        return f"the baseline, which shows smaller changes, is complete in {_cycles(left, cycle_s)}"
+        return f"a baseline for smaller changes is complete in {_cycles(left, cycle_s)}"
     return ""
 
 

@@ -477,7 +477,7 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
         observed.append(f"the torque is not compared with wider joints: {found.reason}")
     elif known:
         since = "changes since the baseline" if found.baseline_m else "changes from the modelled clearances"
-        observed.append(f"{found.cycles} gait cycles show {since} to ± {amount(max(known), 'm')}")
+        observed.append(f"{since} are known to ± {amount(max(known), 'm')} after {found.cycles} gait cycles")
     observed += filter(None, (found.next_step,))
     evidence = (Evidence("torque_mismatch", rest, limit, ""),)
     return [Hit(words={"observed": "; ".join(observed), "advice": ADVICE}, evidence=evidence)]

@@ -167,7 +167,7 @@ _closers: list[Callable[[], None]] = []
 """Functions that close the things open now, the newest last; see `closed_on_interrupt`."""
 
 
-def would_be_lost(frame: FrameType | None) -> bool:
+def exception_may_be_swallowed(frame: FrameType | None) -> bool:
     """True if an exception that is raised in a frame may be swallowed by one of its callers.
 
     Parameters
@@ -216,7 +216,7 @@ def leave(*_: object) -> None:
 
 def interrupt(_number: int, frame: FrameType | None) -> None:
     """Handler of the first Ctrl-C: KeyboardInterrupt where it is not lost; else close all and leave."""
-    if not would_be_lost(frame):
+    if not exception_may_be_swallowed(frame):
         signal.signal(signal.SIGINT, _end_at_once)
         raise KeyboardInterrupt
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -399,7 +399,7 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
     if speed_rpm is None:
         return drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
     if not (math.isfinite(speed_rpm) and abs(speed_rpm) >= LEAST_RPM):
-        expected = f"Expected a speed other than 0 rpm, from {LEAST_RPM:g} on"
+        expected = f"Expected at least {LEAST_RPM:g} rpm in either direction"
         raise ConfigError("speed-rpm", "", f"{speed_rpm} rpm does not turn the crank. {expected}")
     return speed_rpm * TURN / 60.0
 

@@ -30,7 +30,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
-from leg_wear_monitor.monitor.operators import (
+from leg_wear_monitor.monitor.operator_actions import (
     Cleared,
     acknowledge,
     measure,

@@ -364,7 +364,10 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
     if silent_s > SILENT_FROM_S:
         yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
     elif not topic.publishers.fitting and not topic.publishers.refused:
-        yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "no node publishes it"
+        yield (
+            Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN,
+            "no node publishes it. Start its driver, or remap the topic",
+        )
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
         yield Level.ERROR, "has a publisher, but no message has arrived yet"
     if topic.lost > topic.lost_reported:

@@ -24,7 +24,7 @@ from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doub
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
-from leg_wear_monitor.monitor.operators import alarm_words, wear_words
+from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports, Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings import outputs
@@ -205,7 +205,7 @@ class MonitorNode(ClosingNode):
         if self.get_parameter("use_sim_time").value:
             check_stamps(parameters.config, self.get_fully_qualified_name())
         log = self.get_logger()
-        log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
+        log.info("preparing: the first start compiles numerical kernels (half a minute on two processors)")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")), advance_beside():
             self._open(parameters)
 
@@ -215,7 +215,11 @@ class MonitorNode(ClosingNode):
         kept, log = Path(config.ledger.path).absolute(), self.get_logger()
         ledger = f"ledger {kept} is {'continued' if kept.exists() else 'begun'}"
         self._monitor = open_monitor(load_mechanism(config.mechanism), config)
-        log.info(ledger if config.ledger.path else "no ledger: wear is lost at the end")
+        log.info(
+            ledger
+            if config.ledger.path
+            else "no ledger, because ledger.path is empty: the wear is lost at the end"
+        )
         self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
@@ -291,7 +295,7 @@ class MonitorNode(ClosingNode):
 
     def _compile(self, decoder: Decoder) -> None:
         """Compile the kernels before the first sample."""
-        self.get_logger().info("preparing: the leg is set up")
+        self.get_logger().info("preparing: setting up the leg")
         self._monitor.warm_up()
         for stream in STREAMS:
             decoder.one(b"", stream.code)

@@ -20,7 +20,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from leg_wear_monitor.errors import ConfigError, LegWearError, close_open, printable, would_be_lost
+from leg_wear_monitor.errors import (
+    ConfigError,
+    LegWearError,
+    close_open,
+    exception_may_be_swallowed,
+    printable,
+)
 from leg_wear_monitor.monitor.config.parameters import sections_for_others
 from leg_wear_monitor.ros.parameters import ParameterNode
 
@@ -182,7 +188,7 @@ def _stop_making(_number: int, frame: FrameType | None) -> None:
     """Abort the construction of a node: by an exception or, where Python would discard it, by exit."""
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)  # once only; a launch file sends several signals
-    if not would_be_lost(frame):
+    if not exception_may_be_swallowed(frame):
         raise KeyboardInterrupt
     code = COULD_NOT
     try:

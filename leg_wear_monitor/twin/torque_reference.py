@@ -36,8 +36,18 @@ CADENCES = 6  # cadences whose references of a leg are kept
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
 _PERIODS = 4  # evaluation periods in a commanded gait cycle
-PACE = 8  # simulated gait cycles in an evaluation period, a quarter cycle; a core does half as many more
-WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
+SIM_CYCLES_PER_PERIOD = (
+    8  # simulated gait cycles in an evaluation period, a quarter cycle; a core does half as many more
+)
+CLEARANCE_FACTORS = (
+    1.2,
+    1.35,
+    1.5,
+    2.0,
+    3.0,
+    5.0,
+    8.0,
+)  # factors on the expected clearance, one joint at a time
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over its new one, and a factor on the other clearances
 
@@ -370,7 +380,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         narrower = np.where(is_worn, self._fresh, NARROWER * centre)
         legs = [Leg(parameters, centre)]
         for k in range(len(centre)):
-            sizes = [min(factor * centre[k], widest[k]) for factor in WIDER]
+            sizes = [min(factor * centre[k], widest[k]) for factor in CLEARANCE_FACTORS]
             for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
                 other = centre.copy()
                 other[k] = size
@@ -400,7 +410,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
             legs += _of_factors(part.parameters, part.clearance_m[0]) if part.of_frictions.size else []
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
-        self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
+        self._periods = -(-self._cost(legs[: len(self._done)]) // SIM_CYCLES_PER_PERIOD)
 
     @property
     def part(self) -> TorqueReference | None:
@@ -431,7 +441,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
 
     @property
     def _pace(self) -> int:
-        return PACE
+        return SIM_CYCLES_PER_PERIOD
 
 
 def design(parameters: int) -> Floats:

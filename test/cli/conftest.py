@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
-from leg_wear_monitor.monitor.operators import note_verdict
+from leg_wear_monitor.monitor.operator_actions import note_verdict
 
 Run = Callable[..., Result]
 

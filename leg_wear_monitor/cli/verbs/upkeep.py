@@ -101,7 +101,7 @@ def acknowledge(config: Path | None, ledger: Path | None, node: str | None, wait
     if node is not None and config is None:
         common.check_alone(ledger=ledger)
         return _triggered(node, "acknowledge_alarms", wait_s)
-    from leg_wear_monitor.monitor.operators import alarm_words
+    from leg_wear_monitor.monitor.operator_actions import alarm_words
 
     with opened(config, ledger, node) as monitor:
         _need_wear(monitor)
@@ -137,7 +137,7 @@ def reset(
         common.check_alone(ledger=ledger)
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
         return _triggered(node, service, wait_s, times=1 if undo else 2)  # a reset is confirmed
-    from leg_wear_monitor.monitor.operators import alarm_words, wear_words
+    from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 
     now_ns, who = time.time_ns(), getpass.getuser()
     with opened(config, ledger, node, joint) as monitor:

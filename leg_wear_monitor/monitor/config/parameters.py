@@ -184,7 +184,7 @@ def _check_type(parameter: Parameter, value: Any, source: str) -> None:
             raise ConfigError(
                 source,
                 parameter.name,
-                f"{shown(value)} is a whole number to ROS. Expected {shown(entry)}.0{unit}",
+                f"{shown(value)} is an integer for ROS. Expected {shown(entry)}.0{unit}",
             )
 
 

@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 WRONG = [
     ("limits.clearance_m", -1.0, ["-1.0", "above 0 m", "at most 0.1"]),
-    ("limits.clearance_m", 1, ["1 is a whole number", "Expected 1.0 [m]"]),
+    ("limits.clearance_m", 1, ["1 is an integer", "Expected 1.0 [m]"]),
     ("limits.clearance_m", "wide", ["'wide'", "not a number [m]", "at most 0.1"]),
     ("limits.clearance_m", None, ["nothing", "not a number [m]"]),
     ("limits.clearance_m", True, ["True", "not a number [m]"]),
@@ -64,7 +64,7 @@ FILES = [
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
     (
         f"/**: {{ros__parameters: {{limits.clearance_m: 1{400 * '0'}}}}}",
-        ["limits.clearance_m", "is a whole number to ROS. Expected 1000", "000.0 [m]"],
+        ["limits.clearance_m", "is an integer for ROS. Expected 1000", "000.0 [m]"],
     ),
     (
         "/**: {ros__parameters: {limits: {clearance_m: 0.7}, limits.clearance_m: 0.6}}",

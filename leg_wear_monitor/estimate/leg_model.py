@@ -6,7 +6,6 @@ import numpy as np
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.explanations import (
-    MODEL_ERROR,
     Baseline,
     Explainer,
     LeftOut,
@@ -237,25 +236,18 @@ def explainer_of(
     reference: TorqueReference,
     sensor: TorqueSensor,
     commissioned: CommissionedTorque | None,
-    corrected_m: Floats | None = None,
 ) -> Explainer:
-    """Explainer of changes of a leg, measured by a sensor whose noise is known.
-
-    With clearances (k,) [m] that were corrected since the baseline, the baseline is the difference between
-    its signatures and the model's, and a fifth of the correction is uncertain.
-    """
+    """Explainer of changes of a leg, measured by a sensor whose noise is known."""
     model = signature_model(reference, sensor)
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     baseline = unknown_baseline(found, sensor, model.own * model.covariance + model.places)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
     channels, noises = other_channels(reference, sensor), other_noises(reference, sensor)
     own = Explainer(model, joints, baseline, found, channels, noises, fresh_m)
-    return own if commissioned is None else compared_with(own, commissioned, corrected_m)
+    return own if commissioned is None else compared_with(own, commissioned)
 
 
-def compared_with(
-    own: Explainer, commissioned: CommissionedTorque, corrected_m: Floats | None = None
-) -> Explainer:
+def compared_with(own: Explainer, commissioned: CommissionedTorque) -> Explainer:
     """The same explainer of changes since a baseline, as of `explainer_of`; its own one knew no baseline."""
     model = own.model
     expected = model.at(commissioned.clearance_m)[0]
@@ -263,8 +255,4 @@ def compared_with(
     covariance = with_scatter_of(model.covariance, commissioned.signatures)
     model = attrs.evolve(model, covariance=covariance)
     baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
-    if corrected_m is not None:
-        error = MODEL_ERROR * (model.at(corrected_m)[0] - expected)
-        covariance = baseline.covariance + np.diag(np.square(error))
-        baseline = attrs.evolve(baseline, offset=commissioned.mean, covariance=covariance)
     return Explainer(model, own.joints, baseline, own.nuisances, own.channels, own.noises, own.fresh_m)

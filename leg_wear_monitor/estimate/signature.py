@@ -617,11 +617,6 @@ class CommissionedTorque:
         Number of samples that were averaged into one.
     is_instant : bool
         As in `TorqueSensor`.
-    before : CommissionedTorque or None
-        Baseline before a correction: difference between signatures and the model's signatures. The other
-        joints are still to be compared with it.
-    is_interim : bool
-        True if the leg has a lasting change, so that this is no baseline.
     """
 
     stamp_ns: int
@@ -634,8 +629,6 @@ class CommissionedTorque:
     period_s: float = math.nan
     together: int = 1
     is_instant: bool = False
-    before: "CommissionedTorque | None" = None
-    is_interim: bool = False
 
     @sigma_m.default
     def _as_modelled(self) -> Floats:

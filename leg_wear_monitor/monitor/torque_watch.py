@@ -38,6 +38,7 @@ from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.sample import LOADS_N, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 _LOG = logging.getLogger(__name__)
 
@@ -76,6 +77,7 @@ class TorqueWatch(Observer):
         self.record = TorqueRecord(leg.accounting.commissioned)
         self.mismatch = MismatchWindow()
         self.unexplained = ""
+        self._made: tuple[TorqueReference, ...] = ()  # simulated references that are in the ledger
         is_diagnosed = leg.config.diagnosis.enabled and leg.config.wear_acceleration == 1.0
         self.observer = self._new_observer() if is_diagnosed else None
         if self.observer and self.observer.state.parameters and leg.config.diagnosis.apply_corrections:
@@ -190,14 +192,8 @@ class TorqueWatch(Observer):
         if torque is None:
             return
         before = attrs.evolve(torque.state)
-        hidden = before.corrected
-        if hidden is not None and hidden.is_unknown.any():  # a measurement since then need not be asked for
-            stamps_ns = [one.stamp_ns if one is not None else 0 for one in leg.measured]
-            torque.state.measured = tuple(stamp_ns >= hidden.stamp_ns for stamp_ns in stamps_ns)
         correction = torque.end_period(leg.twin.clearance_mean_m, leg.twin.depth)
-        measured = leg.measured[leg.clearance_joints.index(correction.subject)] if correction else None
-        if correction is not None and measured is not None and self._contradiction(correction):
-            torque.contradicted(correction, measured.clearance_m, measured.sigma_m)
+        if correction is not None and self._contradiction(correction):
             correction = None
         is_new, found = False, torque.parameters
         if not self.is_wrong:
@@ -216,20 +212,12 @@ class TorqueWatch(Observer):
 
         To simulate a reference again takes a minute of walking.
         """
-        leg, state = self._leg, torque.state
-        known = (*before.all_commissioned, *(one.baseline for one in before.all_interims))
-        found = state.all_commissioned if not state.is_load_new else ()
-        # a baseline that follows ends the interim
-        is_over = len(state.all_interims) < len(before.all_interims)
-        # a load is known from the twin's motion alone
-        interims = (
-            each for each in state.all_interims if all(one.cause is not Cause.LOAD for one in each.changes)
-        )
-        for baseline in (*found, *(each.baseline for each in interims)):
-            if is_over or all(baseline is not other for other in known):
+        leg, known = self._leg, before.all_commissioned
+        for baseline in torque.state.all_commissioned:
+            if all(baseline is not other for other in known):
                 leg.accounting.note(baseline)
-        made = [one.reference for one in before.known]
-        new = [one for one in torque.simulated_references if all(one is not other for other in made)]
+        made, self._made = self._made, torque.simulated_references
+        new = [one for one in self._made if all(one is not other for other in made)]
         for reference in new:
             names, stamp_ns = tuple(leg.mechanism.bodies), leg.twin.intake.followed_stamp_ns
             leg.accounting.note(SimulatedReference(stamp_ns, names, reference))

@@ -7,7 +7,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import (
-    CORRECTED_FROM,
     SURE_LOG_ODDS,
     SURE_SIGMAS,
     Cause,
@@ -16,31 +15,18 @@ from leg_wear_monitor.estimate.cause import (
 from leg_wear_monitor.estimate.change_detector import first_changed
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, best_fit, start_of, starts_of, with_rivals
 from leg_wear_monitor.estimate.drive import DIRECT
-from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explanation, change_of, with_doubt
+from leg_wear_monitor.estimate.explanations import Explanation, change_of, with_doubt
 from leg_wear_monitor.estimate.signature import with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.references import COMMISSIONING_CYCLES, LegModels
-from leg_wear_monitor.monitor.diagnosis.state import (
-    Interim,
-    SignedCycle,
-    TorqueState,
-)
+from leg_wear_monitor.monitor.diagnosis.references import LegModels
+from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
 
 SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corrected by it
-
-# mean square up to which a second joint explains the residual of a corrected leg against the baseline before:
-# G, I and B left 0.9 to 1.1 where they had opened with A and G, and J 1.9, at 1.7 mm for 0.6 (2026-11-27)
-_WHOLLY = 1.5
 
 # mean square up to which all clearances at once explain a leg with one or two open joints: 0.9 to 1.4; five,
 # which they do not tell apart, leave 1.5 to 1.7, and a mass on the thigh 1.8 to 3.6 (2026-11-27)
 _WHOLE = 1.4
-
-# divisor of the log odds over the next cause during an interim, because the model does not describe such a
-# leg: with twice the friction, G at 0.50 mm was B, with odds of e^12 over G. Right names have e^62 and more
-# with a lag, e^118 and more at 2 mm, e^19 to e^38 at 0.5 to 0.6 mm with a mass (2026-11-27)
-_BESIDE = 5.0
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
 _LEAST_CYCLES_UNLIKE = 6  # for a leg that differs from its reference: two strange steps are no change
@@ -105,7 +91,6 @@ class Evidence:
             return
         self._test(state, cycle, config)
         self._explain(state, config)
-        self._begin_interim(state, config)
 
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
@@ -113,7 +98,8 @@ class Evidence:
         if not state.is_compared:  # results from a different cadence stay
             return
         reported = state.changes
-        state.detector, state.changes, state.fit_due = None, (), 0
+        is_before = bool(reported and state.cycles and reported[-1].since_ns < state.cycles[0].begin_ns)
+        state.detector, state.changes, state.fit_due = None, reported if is_before else (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)
@@ -124,65 +110,23 @@ class Evidence:
         """Take the gait cycles since a change as the commissioned leg's, with clearances (k,) [m].
 
         The error of the correction then does not look like a further change; it stays in the standard
-        deviation. Simultaneous changes of other joints do not show either: they are not known until the leg
-        is compared with the baseline before (`compare_with_before`).
+        deviation. A second joint that opened as well would have explained the change better; the error of
+        the fit of all clearances tells how far it may have opened.
         """
-        explainer = self._models.explainer(state)  # for the baseline before
+        known, k = state.commissioned, self._models.explainer(state).joints.index(change.subject)
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        before, sigma_m = state.commissioned, modelled_m.copy()
-        if before is not None and before.before is not None:  # joints that were corrected since stay known
-            sigma_m = np.where(before.is_unknown, modelled_m, before.sigma_m)
-        sigma_m[explainer.joints.index(change.subject)] = change.sigma
-        if before is not None:
-            signatures_before = before.signatures - before.mean + explainer.baseline.offset
-            before = before.before or attrs.evolve(before, signatures=signatures_before)
+        sigma_m = state.fit.sigma_m.copy() if known and state.fit else modelled_m.copy()
+        sigma_m[k] = change.sigma
         state.forget_baselines()
-        channel = before.channel if before else DIRECT
-        state.commissioned = state.baseline(
-            state.cycles, modelled_m, sigma_m=sigma_m, channel=channel, before=before
-        )
+        channel = known.channel if known else DIRECT
+        state.commissioned = state.baseline(state.cycles, modelled_m, sigma_m=sigma_m, channel=channel)
         state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
-
-    def compare_with_before(self, state: TorqueState, is_last: bool = False) -> Change | None:
-        """Compare a corrected leg with the baseline before, once there is a reference about it.
-
-        A simultaneous change of a second joint is in the baseline after the correction, and would never be
-        detected. Returns the change of a joint that surely opened as well. Without one, or the last time, the
-        other clearances get the errors with which the fit explains the leg.
-        """
-        known, is_fitted = state.commissioned, state.fit_due == _FIT_EVERY - 1
-        if known is None or known.before is None or state.reference is None:
-            return None
-        if state.changes or not is_fitted or len(state.cycles) < SETTLING_CYCLES:
-            return None
-        explainer = self._models.explainer_since(known.before, state.reference, state)
-        if explainer is None:
-            return None
-        modelled_m, mean, cycles = state.modelled_m, state.signatures.mean(axis=0), len(state.cycles)
-        explanations = explainer.explanations(mean, cycles, modelled_m)
-        change = change_of(explanations, state.settled[-1].since_ns if state.settled else known.stamp_ns)
-        is_found = change is not None and change.is_sure and change.is_wide
-        if is_found and explanations[0].square <= _WHOLLY and not is_last:
-            return change
-        found = best_fit(explainer, mean, cycles, modelled_m, starts_of(explainer, None, modelled_m))
-        state.commissioned = attrs.evolve(known, before=None)
-        if found.square <= _WHOLLY:
-            corrected_m = np.abs(modelled_m - known.before.clearance_m).max()
-            apart_m = np.abs(found.clearance_m - modelled_m)
-            own_m = np.sqrt(found.sigma_m**2 + apart_m**2 + (MODEL_ERROR * corrected_m) ** 2)
-            own_m = np.hypot(own_m, known.before.sigma_m)
-            # wide enough for a correction, but not surely: J at 0.60 mm with B was 0.57 ± 0.06, or it was I
-            own_m = np.where(found.clearance_m >= CORRECTED_FROM * modelled_m, modelled_m, own_m)
-            state.know_corrected(np.where(known.is_unknown, own_m, known.sigma_m))
-        state.fit_due = 0
-        return None
 
     def _know_sensor(self, state: TorqueState) -> None:
         """Find the noise of the torque sensor, and the channel behind which a commissioned leg is expected.
 
         Before it is commissioned, a wide joint and a filter could be taken for each other, so there is no
-        channel. A baseline after a correction has an uncertain clearance: its channel is the channel of the
-        baseline before.
+        channel. A baseline after a correction has an uncertain clearance: it keeps its channel.
         """
         known = state.commissioned
         if state.reference is None or state.sensor is None or not (known or state.cycles):
@@ -207,10 +151,6 @@ class Evidence:
 
     def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
         """Renew the clearances, and the change if there is one."""
-        if state.is_load_other and state.not_by_load:
-            return  # the reported changes stay
-        if state.interim is not None and not state.interim.changes:
-            state.interim = self._known_again(state, state.interim)
         # the gait cycles since the change, if there is one: often at first, then now and then
         since_ns = self._since_ns(state, config)
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
@@ -219,19 +159,15 @@ class Evidence:
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1
-        if state.changes and state.changes[-1].cause is Cause.NOISE:  # it may come and go
-            cycles = cycles[-SETTLING_CYCLES:]
+        if state.changes and state.changes[-1].cause not in (Cause.CLEARANCE, Cause.SEVERAL):
+            cycles = cycles[-SETTLING_CYCLES:]  # it may come and go
         # single causes: of a change, and of a leg that was never commissioned
         mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.modelled_m)
-        if state.interim is not None:
-            explanations = self._beside_interim(state, cycles, explanations)
-            cycles = cycles[-len(state.cycles) :]
-            mean = np.mean([cycle.signature for cycle in cycles], axis=0)
         # for a leg that differs from the reference, no names and no clearances are known
-        is_known = state.commissioned or state.changes or state.is_load_other
+        is_known = state.commissioned or state.changes
         if not (is_known or self._fits(state, explanations, since_ns)):
             self._report(state, None, since_ns, len(cycles), config)
             state.fit, state.least_m = None, ()
@@ -241,66 +177,9 @@ class Evidence:
         fit = self._fit(state, mean, len(cycles), change, explanations if since_ns else ())
         if change is not None and fit.square > _WHOLE:
             change = with_doubt(change, explanations)
-        if change is not None and state.interim_changes:
-            change = attrs.evolve(change, runner_up_log_odds=change.runner_up_log_odds / _BESIDE)
         state.fit, state.fit_cycles = fit, len(cycles)
         self._report(state, change, since_ns, len(cycles), config)
         self._keep_least(state, change, config)
-        if change is None and state.is_load_new and not (state.is_load_other or state.commissioned):
-            _report_wide(state, fit, self._models.explainer(state).joints, since_ns or cycles[0].begin_ns)
-
-    def _begin_interim(self, state: TorqueState, config: MonitorConfig) -> None:
-        """From now on, compare with the leg as it has changed, unless the change is of a clearance.
-
-        Otherwise the change hides a joint that opens: G that broke out to 2 mm after a mass had been put on
-        the foot was that mass for good (2026-11-27).
-        """
-        if state.commissioned is None or not state.changes or state.is_load_new or state.is_load_other:
-            return
-        change, known = state.changes[-1], state.commissioned
-        since = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        if change.cause in (Cause.CLEARANCE, Cause.SEVERAL, Cause.NOISE) or len(since) < COMMISSIONING_CYCLES:
-            return
-        baseline = state.baseline(
-            since, state.modelled_m, sigma_m=known.sigma_m, channel=known.channel, is_interim=True
-        )
-        if change.cause in (Cause.LAG, Cause.TIMING) and state.reference and state.sensor:
-            behind = self._models.channel(state.reference, state.sensor, baseline).channel
-            baseline = attrs.evolve(baseline, channel=behind)
-        state.interim, state.changes = Interim((*state.interim_changes, change), baseline), ()
-        state.detector, state.fit_due = self._models.detector(state, config).fresh(), 0
-
-    def _known_again(self, state: TorqueState, interim: Interim) -> Interim | None:
-        """The changes of the run before, found again; None if nothing is left of them."""
-        known, explainer = interim.baseline, self._models.explainer(state, is_commissioned=True)
-        found = change_of(explainer.explanations(known.mean, known.cycles, known.clearance_m), known.stamp_ns)
-        return Interim((found,), known) if found else None
-
-    def _beside_interim(
-        self, state: TorqueState, cycles: Sequence[SignedCycle], explanations: Sequence[Explanation]
-    ) -> Sequence[Explanation]:
-        """Explanations of changes beyond the interim, or, if the interim is over, of all changes.
-
-        The interim is over if the last gait cycles match the commissioned leg. It is replaced if one of its
-        causes alone, with a different size, explains a seemingly further change as well, or if its unknown
-        cause is known by now.
-        """
-        recent = cycles if explanations else cycles[-SETTLING_CYCLES:]
-        mean = np.mean([cycle.signature for cycle in recent], axis=0)
-        explainer = self._models.explainer(state, is_commissioned=True)
-        alone = explainer.explanations(mean, len(recent), state.modelled_m)
-        change, reported = change_of(alone, 0), [(one.cause, one.subject) for one in state.interim_changes]
-        if change is None:
-            is_over = True
-        elif explanations:
-            is_over = (change.cause, change.subject) in reported and alone[0].misfit <= explanations[0].misfit
-        else:
-            is_over = (Cause.UNKNOWN, "") in reported and change.cause is not Cause.UNKNOWN
-        if not is_over:
-            return explanations
-        state.forget_interims()
-        state.cycles = tuple(recent)
-        return alone if explanations else ()
 
     def _since_ns(self, state: TorqueState, config: MonitorConfig) -> int:
         """Stamp since when the leg has changed, as reported before or as detected now; 0 where it has not."""
@@ -342,17 +221,12 @@ class Evidence:
 
         Before a leg is commissioned, only a sure clearance that is wide enough for a correction counts: all
         else is constant, and becomes part of the baseline. A change of a clearance gets its most probable
-        start; any other change starts at its detection. Under a load that differs from the reference, nothing
-        is sure: an unknown change is attributed to the load, and so is any change before a baseline.
+        start; any other change starts at its detection.
         """
         change = change_of(explanations, since_ns)
         of_load = _changed_load(state, change) if change else None
         if of_load is not None:
             return of_load
-        if change and state.is_load_other:
-            if change.cause is Cause.UNKNOWN:
-                return None
-            change = attrs.evolve(change, runner_up=Cause.LOAD.value, runner_up_log_odds=0.0)
         if state.commissioned is None and not (change and change.is_sure and change.is_wide):
             return None
         if change is None or change.cause not in (Cause.CLEARANCE, Cause.SEVERAL):
@@ -376,7 +250,8 @@ class Evidence:
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
         found = best_fit(explainer, mean, cycles, modelled_m, starts, known_sigma_m)
         found = with_rivals(found, explanations, explainer.joints)
-        if change is not None and change.cause is Cause.CLEARANCE:  # it may hide a second joint
+        is_single = change is not None and change.cause is Cause.CLEARANCE
+        if change is not None and is_single and state.commissioned is None:  # it may hide a second joint
             others = np.array([joint != change.subject for joint in explainer.joints])
             hidden = np.diag(np.where(others, found.clearance_m, 0.0) ** 2)
             found = attrs.evolve(found, covariance=found.covariance + hidden)
@@ -410,11 +285,10 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
 
     The load's shape differs from the shape of its column, and impacts change where it presses the joints: put
     on the ground, a healthy leg was A or J, *or something else*. A joint surely named before stays, and a leg
-    that has a reference under a load, or will get one, follows the reference.
+    that has a reference under a load follows the reference.
     """
     reported = state.changes[-1] if state.changes else None
-    follows = state.is_loaded or state.is_load_new or state.is_load_other
-    if follows or state.commissioned is None or (reported and reported.is_sure):
+    if state.is_loaded or state.commissioned is None or (reported and reported.is_sure):
         return None
     cycles = sum(one.begin_ns >= change.since_ns for one in state.cycles)
     earlier = state.carried_n[: -(cycles + _AMIDST)]
@@ -432,28 +306,6 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
         counted=before_n,
         log_odds=change.log_odds,
     )
-
-
-def _report_wide(state: TorqueState, fit: ClearanceFit, joints: Sequence[str], since_ns: int) -> None:
-    """Report a joint that is wider by all clearances at once, before the baseline under a new load hides it.
-
-    The report is doubtful, because the load was found from a torque that includes the joint's effect.
-    """
-    beyond = (fit.clearance_m - state.modelled_m) / fit.sigma_m
-    k = int(np.argmax(beyond))
-    change = Change(
-        cause=Cause.CLEARANCE,
-        subject=joints[k],
-        since_ns=since_ns,
-        value=float(fit.clearance_m[k]),
-        sigma=float(fit.sigma_m[k]),
-        counted=float(state.modelled_m[k]),
-        log_odds=0.5 * float(beyond[k]) ** 2,
-        runner_up=Cause.LOAD.value,
-        runner_up_log_odds=0.0,
-    )
-    if beyond[k] >= SURE_SIGMAS and change.is_wide:
-        state.changes = (change,)
 
 
 def _since(change: Change, earlier_ns: int, state: TorqueState) -> Change:

@@ -94,7 +94,7 @@ def find_sensor(
     own = state.sensor
     is_known = state.reference is not None or len(state.waiting) >= FIRST_CYCLES
     last = (NotUsed.JITTER,) * (UNUSED_CYCLES if is_known else UNUSABLE_CYCLES)
-    if own is not None and (state.interim_changes or state.changes or state.unused[-len(last) :] != last):
+    if own is not None and (state.changes or state.unused[-len(last) :] != last):
         return
     between_ns = np.diff(within(state.samples.torque, begin_ns, end_ns)["stamp_ns"])
     period_ns = float(np.median(between_ns)) if len(between_ns) > 1 else math.nan

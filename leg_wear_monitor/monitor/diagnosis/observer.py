@@ -164,10 +164,11 @@ class TorqueObserver(KeepsSamples):
 
     def withdraw(self, since_ns: int) -> None:
         """Forget the gait cycles from a stamp on: the torque that was received was wrong."""
-        state, before = self.state, self._kept_cycles
+        state = self.state
+        before = (*state.due, *state.cycles, *state.waiting, *state.odd)
         state.due = tuple(span for span in state.due if span[0] < since_ns)
         state.forget_cycles(since_ns)
-        number = before - self._kept_cycles
+        number = len(before) - len((*state.due, *state.cycles, *state.waiting, *state.odd))
         if not number:
             return
         state.leave_out(NotUsed.TORQUE_CAUSE, number)
@@ -215,41 +216,13 @@ class TorqueObserver(KeepsSamples):
         self._follow_counted(modelled_m)
         self._follow_load()
         ended = self.evaluate_due(self._evaluate)
-        is_renewed = self._references.advance(state, modelled_m, depth)
-        if self._found_load() or is_renewed:
+        if self._references.advance(state, modelled_m, depth):
             self._evidence.review(state, self.config)
         if not ended or not self.config.diagnosis.apply_corrections or self._references.is_to_identify(state):
             return None
         if not self.models.is_sure(state):
             return None
-        return correction_of(state, self._joints) or self._opened_with_it()
-
-    def _opened_with_it(self) -> Change | None:
-        """A second joint that opened together with the corrected joint."""
-        change = self._evidence.compare_with_before(self.state)
-        if not any(one.before for one in self.state.all_commissioned):
-            self.state.settled = self.state.corrections
-        return change
-
-    def contradicted(self, change: Change, clearance_m: float, sigma_m: float) -> None:
-        """Note a change that a measured clearance [m] contradicts, and that is not applied.
-
-        If the joint opened together with a corrected joint, its clearance is known from the measurement
-        meanwhile, and the other clearances get the errors with which the fit explains the leg. The comparison
-        goes on, until both agree.
-        """
-        state, k = self.state, self._joints.index(change.subject)
-        known = state.commissioned
-        if change in state.changes or known is None or known.before is None:
-            return
-        state.settled = (*state.corrections, change)
-        known_sigma_m = math.hypot(sigma_m, clearance_m - float(known.clearance_m[k]))
-        if known.sigma_m[k] == known_sigma_m:
-            return
-        self._evidence.compare_with_before(state, is_last=True)
-        state.commissioned = attrs.evolve(state.commissioned or known, before=known.before)
-        others_m = state.commissioned.sigma_m
-        state.know_corrected(np.where(np.arange(len(others_m)) == k, known_sigma_m, others_m))
+        return correction_of(state, self._joints)
 
     def corrected(self, change: Change, modelled_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
@@ -270,7 +243,7 @@ class TorqueObserver(KeepsSamples):
     def parameters(self) -> LegParameters | None:
         """Identified masses, lengths and friction that explain the drive torque; None without any."""
         own, reference = self.state.parameters, self.state.reference
-        if own is None or reference is None or reference.parameters != own or self.state.is_load_new:
+        if own is None or reference is None or reference.parameters != own or self.state.is_load_other:
             return None
         is_near = self.models.fits if own.load.size else self.models.is_of_file
         return own if is_near(self.state) else None
@@ -278,8 +251,7 @@ class TorqueObserver(KeepsSamples):
     @property
     def simulated_references(self) -> tuple[TorqueReference, ...]:
         """The references that were simulated in this run, of all cadences."""
-        made = (one.reference for one in self.state.known)
-        return tuple(one for one in made if not self._references.is_given(one))
+        return self._references.simulated
 
     @property
     def part_of_reference(self) -> TorqueReference | None:
@@ -323,12 +295,10 @@ class TorqueObserver(KeepsSamples):
     def diagnosis(self) -> Diagnosis:
         """Current results from the drive torque."""
         state, known = self.state, self.state.commissioned
-        is_changed = state.changes or state.interim_changes
-        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not is_changed)
-        is_old = (is_old or state.detector is None) and not (state.is_load_new and state.not_corrected)
+        is_old = not state.cycles or len(state.unused) == UNUSED_CYCLES or state.detector is None
         found = Diagnosis(
             next_step=next_step(state, self._references, self.config),
-            changes=state.settled + state.interim_changes,
+            changes=state.settled,
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
             load=self._load,
@@ -336,7 +306,7 @@ class TorqueObserver(KeepsSamples):
             temperature_c=state.temperature_c,
             commissioned_c=known.temperature_c if known else None,
         )
-        if state.fit is None or is_old:
+        if state.fit is None or (is_old and not state.not_corrected):
             reason = _joined(missing(state, self._references, self.config), other_sensor(state))
             return attrs.evolve(found, state=DiagnosisState.WAITING, reason=reason)
         clearance_m, sigma_m = self._observed(state.fit)
@@ -356,18 +326,15 @@ class TorqueObserver(KeepsSamples):
         """Observable clearances and their standard deviations, NaN for the others.
 
         A joint is not observable either if no test would detect it at the width of a correction. A joint that
-        the fit of all joints does not show, or only as it was measured, is known from its own change, and so
-        is a joint that opened during an interim. If the reference does not match the leg, a change can have
-        the name of a wrong joint, and no clearance is known.
+        the fit of all joints does not show is known from its own change. If the reference does not match the
+        leg, a change can have the name of a wrong joint, and no clearance is known.
         """
         if not self.models.fits(self.state):
             nothing = np.full(len(fit.clearance_m), math.nan)
             return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
         known = self.state.commissioned
-        if self.state.interim_changes:
-            observable &= False
-        elif known is not None and known.is_as_modelled:  # a corrected one is known from its correction
+        if known is not None and known.is_as_modelled:  # a corrected one is known from its correction
             unseen_m = self.models.detector(self.state, self.config).unseen_m(WINDOW_CYCLES)
             observable &= unseen_m <= CORRECTED_FROM * self.state.modelled_m
         clearance_m, sigma_m = (
@@ -380,7 +347,7 @@ class TorqueObserver(KeepsSamples):
             opened = (change,) if change.cause is Cause.CLEARANCE else change.joints
             for one in opened:
                 k = self._joints.index(one.subject)
-                if not observable[k] or change.joints or change in self.state.settled:
+                if not observable[k] or change.joints:
                     clearance_m[k], sigma_m[k] = one.value, one.sigma
         return clearance_m, sigma_m
 
@@ -393,13 +360,6 @@ class TorqueObserver(KeepsSamples):
         state, reference = snapshot
         self.state = attrs.evolve(state)
         self._references.restore(reference)
-
-    @property
-    def _kept_cycles(self) -> int:
-        """Number of gait cycles that are kept, at all cadences."""
-        state = self.state
-        kept = (one.cycles for one in state.known)
-        return sum(map(len, (*kept, state.waiting, state.odd, state.due)))
 
     def _evaluate(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the evidence."""
@@ -414,12 +374,9 @@ class TorqueObserver(KeepsSamples):
             state.wait_with(cycle)
             return
         if not cycle.profile.is_like(state.reference.profile):
-            other = state.at(cycle.profile)
-            if other is None:
-                state.wait_with(cycle)
-                state.leave_out(NotUsed.UNLIKE)
-                return
-            state.turn_to(other)
+            state.wait_with(cycle)
+            state.leave_out(NotUsed.UNLIKE)
+            return
         state.unused = ()
         state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
         if state.sensor and state.sensor.noise_nm:
@@ -461,10 +418,6 @@ class TorqueObserver(KeepsSamples):
             sigma_m = np.where(corrected.is_unknown, state.modelled_m, corrected.sigma_m)
             known = attrs.evolve(known, sigma_m=sigma_m, channel=corrected.channel)
         state.commissioned, state.failure = known, ""
-        if state.is_load_new and state.load_rounds >= LOAD_ROUNDS:  # the new load explains all changes
-            state.is_load_new, state.settled = False, state.corrections
-        elif state.is_load_new:
-            state.load_rounds, state.renewed_n = 0, float(np.mean(state.carried_n))
         self._evidence.review(state, self.config)
 
     def _restart(self, modelled_m: Floats) -> None:
@@ -472,7 +425,6 @@ class TorqueObserver(KeepsSamples):
         state = self.state
         state.modelled_m = np.asarray(modelled_m, float).copy()
         state.forget_cycles()
-        state.forget_interims()
         state.detector, state.has_failed = None, False
         state.changes, state.carried_n, state.least_m = (), (), ()
 
@@ -480,43 +432,28 @@ class TorqueObserver(KeepsSamples):
         """Commission the leg anew if its load differs from the load of its reference.
 
         Once for each load: the load from the twin or a sensor may differ from the force of the reference. A
-        joint that was named before stays reported until the leg is compared with a reference of the new load.
+        joint that was surely named before stays reported.
         """
         state = self.state
-        is_found = state.commissioned is None and state.load_rounds >= LOAD_ROUNDS
-        state.is_load_other = state.is_load_new and not is_found
-        is_due = self._is_on_ground and len(state.carried_n) >= FIRST_CYCLES and not state.is_load_other
+        is_due = self._is_on_ground and len(state.carried_n) >= FIRST_CYCLES
         if state.reference is None or not (is_due and state.is_loaded):
+            state.is_load_other = False
             return
         peak_n = float((state.reference.parameters.load @ self._up).max())
         state.is_load_other = self._has_moved(peak_n, FIRST_CYCLES)
         is_long = len(state.carried_n) == UNLIKE_CYCLES and state.load_rounds >= LOAD_ROUNDS
-        if not (is_long and self._has_moved(peak_n, UNLIKE_CYCLES)):
-            return
-        state.settled += state.not_by_load
-        state.is_load_new, state.is_load_other, state.load, state.load_rounds = True, True, None, 0
-        state.forget_baselines()
-        self._restart(state.modelled_m)
+        if is_long and self._has_moved(peak_n, UNLIKE_CYCLES):
+            state.settled += state.not_by_load
+            state.load, state.load_rounds, state.renewed_n = None, 0, float(np.mean(state.carried_n))
+            state.forget_baselines()
+            self._restart(state.modelled_m)
 
     def _has_moved(self, peak_n: float, cycles: int) -> bool:
-        """True if the foot's load in the last gait cycles differed from the reference's load."""
-        now_n = float(np.mean(self.state.carried_n[-cycles:]))
-        is_renewed = abs(now_n - self.state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)
+        """Whether the foot's load in the last gait cycles differed from the reference's load."""
+        state, now_n = self.state, float(np.mean(self.state.carried_n[-cycles:]))
+        is_found = state.load_rounds >= LOAD_ROUNDS
+        is_renewed = is_found and abs(now_n - state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)
         return abs(now_n - peak_n) > _MOVED * max(peak_n, _LEAST_LOAD_N) and not is_renewed
-
-    def _found_load(self) -> bool:
-        """Forget the baseline that served to find a new load, once the reference under this load is in force.
-
-        Joints that opened meanwhile are in this baseline: until the next one, the leg is compared with the
-        reference alone.
-        """
-        state = self.state
-        is_done = state.load_rounds > 0 and not self._references.is_busy
-        if not (state.is_load_new and is_done and state.commissioned):
-            return False
-        state.load_rounds, state.is_load_other, state.settled = LOAD_ROUNDS, False, state.corrections
-        state.forget_baselines()
-        return True
 
     def _follow_counted(self, modelled_m: Floats) -> None:
         """Compare with the modelled clearances as they grow."""

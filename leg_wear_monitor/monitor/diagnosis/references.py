@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, SignedCycle, TorqueState
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
 from leg_wear_monitor.twin.torque_reference import (
+    CADENCES,
     LEAST_CLEARANCE_M,
     ReferenceSnapshot,
     TorqueReference,
@@ -94,24 +95,9 @@ class LegModels:
         """Compute the torque's derivatives by masses and lengths now: later, samples would wait too long."""
         body_torques(self._mechanism)
 
-    def explainer(self, state: TorqueState, is_commissioned: bool = False) -> Explainer:
-        """Possible explanations of the measured torque: other clearances and other causes.
-
-        They add to the changes of the interim, if there is one; with ``is_commissioned``, they cover all
-        changes.
-        """
-        return self._of(state, is_commissioned).explainer
-
-    def explainer_since(
-        self, before: signature.CommissionedTorque, reference: TorqueReference, state: TorqueState
-    ) -> Explainer | None:
-        """Possible explanations of a corrected leg's difference from the baseline before the correction.
-
-        None before there is a reference about the corrected clearances.
-        """
-        if state.sensor is None or _is_far(reference, state.modelled_m) or not before.is_of(state.sensor):
-            return None
-        return explainer_of(self._mechanism, reference, state.sensor, before, state.modelled_m)
+    def explainer(self, state: TorqueState) -> Explainer:
+        """Possible explanations of the measured torque: other clearances and other causes."""
+        return self._of(state).explainer
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests for a change of the modelled clearances."""
@@ -166,7 +152,7 @@ class LegModels:
         commissioned = state.commissioned
         if state.reference is None or commissioned is None or not commissioned.is_as_modelled:
             return 0.0
-        own = self._of(state, is_commissioned=True)
+        own = self._of(state)
         if own.misfit is None:
             own.misfit = misfit(own.explainer.model, own.explainer.nuisances, commissioned)
         return own.misfit
@@ -192,7 +178,7 @@ class LegModels:
 
     def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
         """Force of the ground on the commissioned leg; the reference may have a different force."""
-        own, known, sensor = self._of(state, is_commissioned=True), state.commissioned, state.sensor
+        own, known, sensor = self._of(state), state.commissioned, state.sensor
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
         linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
@@ -212,13 +198,11 @@ class LegModels:
     def is_sure(self, state: TorqueState) -> bool:
         """True if a clearance may be corrected: the leg is known and unchanged, its drive passes enough."""
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
-        is_changed = state.is_load_new or state.is_load_other or bool(state.interim_changes)
-        return not is_changed and self.is_of_file(state) and is_near and not state.is_narrow
+        return not state.is_load_other and self.is_of_file(state) and is_near and not state.is_narrow
 
-    def _of(self, state: TorqueState, is_commissioned: bool = False) -> _ModelsOfState:
+    def _of(self, state: TorqueState) -> _ModelsOfState:
         """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
-        reference, own = state.reference, (state.sensor, state.commissioned)
-        sensor, known = own if is_commissioned else state.compared_with
+        reference, sensor, known = state.reference, state.sensor, state.commissioned
         if reference is None or sensor is None:
             raise RuntimeError("there is no reference yet")
         for one in self._kept:
@@ -261,7 +245,9 @@ class References:
     Attributes
     ----------
     may_be_late : bool
-        True if the monitor never waits for simulations, see `TorqueReferenceRun`.
+        Whether the monitor never waits for simulations, see `TorqueReferenceRun`.
+    simulated : tuple of TorqueReference
+        References that were simulated in this run, the last one of each cadence, the newest first.
 
     Raises
     ------
@@ -282,7 +268,8 @@ class References:
         self._mechanism, self._models, self._part = mechanism, models, part
         self._is_on_ground = is_on_ground
         usable = (one for one in given if is_on_ground or not one.parameters.load.size)
-        self._given = (*usable, *shipped_references(mechanism))
+        self._stored = (*usable, *shipped_references(mechanism))
+        self.simulated: tuple[TorqueReference, ...] = ()
         self._run: TorqueReferenceRun | None = None
 
     @property
@@ -300,10 +287,6 @@ class References:
         """True if a simulation is overdue: the machine is too slow."""
         return self._run is not None and self._run.is_late
 
-    def is_for(self, profile: CrankProfile) -> bool:
-        """True if the running simulation is for this motion of the crank."""
-        return self.is_busy and self._run is not None and profile.is_like(self._run.profile)
-
     @property
     def cycles_left(self) -> float:
         """Commanded gait cycles until the simulation is complete."""
@@ -313,10 +296,6 @@ class References:
     def part(self) -> TorqueReference | None:
         """The unfinished reference with the legs simulated so far; None if there are none, or all are."""
         return self._run.part if self._run is not None else None
-
-    def is_given(self, reference: TorqueReference) -> bool:
-        """True if a reference was known beforehand."""
-        return any(reference is one for one in self._given)
 
     def snapshot(self) -> ReferenceSnapshot | None:
         """State of the simulation; None before the first one."""
@@ -341,18 +320,24 @@ class References:
         bool
             True if the reference of the state was replaced, so that the kept cycles must be evaluated again.
         """
+        is_elsewhere = state.is_elsewhere and len(state.waiting) >= FIRST_CYCLES
+        stored = self._stored_like(state) if is_elsewhere else None
+        if stored is not None and stored is not state.reference:
+            state.turn_to(stored)
+            return True
         if self._run is not None and self._run.is_busy:
             return self._continue(self._run, state, modelled_m, depth)
         if state.has_failed:
             return False
-        if len(state.waiting) >= (FIRST_CYCLES if state.reference is None else UNLIKE_CYCLES):
-            return self._choose(state, modelled_m, depth)
+        if is_elsewhere and (state.reference is None or len(state.waiting) >= UNLIKE_CYCLES):
+            self._begin(state.parameters, modelled_m, depth, _mean_motion(state.waiting))
+            return False
         if state.reference is None or len(state.cycles) < FIRST_CYCLES:
             return False
         own, identified = state.reference.parameters, state.parameters
         if _is_far(state.reference, modelled_m):
-            self._begin(own if state.is_final else identified, modelled_m, depth, state.profile)
-        elif not state.is_final and identified not in (None, own):  # from a different cadence or earlier
+            self._begin(identified or own, modelled_m, depth, state.profile)
+        elif identified not in (None, own):  # from a different cadence or earlier
             self._begin(identified, modelled_m, depth, state.reference.profile)
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
@@ -428,30 +413,34 @@ class References:
     ) -> bool:
         """Continue the simulation for a period, and use the reference that it completes.
 
-        Returns whether the state has a new reference; it belongs to the cadence that it was simulated for.
+        Returns whether the state has a new reference. At a different cadence by now, a reference is stored
+        until the leg returns, and an identification is repeated.
         """
         found = run.advance()
-        if found is not None and state.is_identifying:
-            self._identify(state, found, modelled_m, depth)
-        elif found is not None:
-            self._install(state, found)
-            return True
-        elif not run.is_busy:
-            _abandon(state)
-        return False
+        if found is None:
+            if not run.is_busy:
+                _abandon(state)
+            return False
+        is_here = state.reference is not None and found.profile.is_like(state.reference.profile)
+        if state.is_identifying:
+            state.is_identifying = False
+            if is_here and state.commissioned is not None:
+                self._identify(state, found, state.commissioned, modelled_m, depth)
+            elif len(found.torque_nm) == 1:
+                state.load_rounds = 0
+            else:
+                state.rounds -= 1
+            return False
+        others = (one for one in self.simulated if not found.profile.is_like(one.profile))
+        self.simulated = (found, *others)[:CADENCES]
+        return self._install(state, found) if is_here else False
 
-    def _choose(self, state: TorqueState, modelled_m: Floats, depth: Floats) -> bool:
-        """Use a given reference of the same motion, preferably one of this leg, or begin a new one."""
-        profile = mean_profile([cycle.profile for cycle in state.waiting])
-        drive = state.parameters.compliance if state.parameters else 0.0
-        alike = [
-            one for one in self._given if profile.is_like(one.profile) and one.parameters.compliance == drive
-        ]
-        if alike:
-            self._install(state, next((one for one in alike if one.parameters == state.parameters), alike[0]))
-            return True
-        self._begin(state.parameters, modelled_m, depth, profile)
-        return False
+    def _stored_like(self, state: TorqueState) -> TorqueReference | None:
+        """A stored reference of the motion in the waiting gait cycles, preferably one of this leg."""
+        profile, drive = _mean_motion(state.waiting), state.parameters.compliance if state.parameters else 0.0
+        known = (one for one in (*self.simulated, *self._stored) if profile.is_like(one.profile))
+        alike = [one for one in known if one.parameters.compliance == drive]
+        return next((one for one in alike if one.parameters == state.parameters), next(iter(alike), None))
 
     def _running(self) -> TorqueReferenceRun:
         """The run, created when first needed."""
@@ -482,54 +471,58 @@ class References:
             return None
         return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 
-    def _identify(self, state: TorqueState, legs: TorqueReference, modelled_m: Floats, depth: Floats) -> None:
+    def _identify(
+        self,
+        state: TorqueState,
+        legs: TorqueReference,
+        known: signature.CommissionedTorque,
+        modelled_m: Floats,
+        depth: Floats,
+    ) -> None:
         """Find the parameters that explain the commissioned leg, and begin a reference with them.
 
         A single leg among `legs` is one under a load: then the force is found again, or is final.
         """
-        state.is_identifying = False
-        state.turn_towards(legs.profile)
-        if state.commissioned is not None and len(legs.torque_nm) == 1:
-            if state.load_rounds < LOAD_ROUNDS:
-                self._begin_under_load(state, legs, depth)
-            else:
-                state.parameters = legs.parameters
-                self._begin(state.parameters, modelled_m, depth, legs.profile)
-        elif state.commissioned is not None:
-            explainer = self._models.explainer(state, is_commissioned=True)
-            found = identification.identified_leg(
-                legs, explainer.model, explainer.nuisances, state.commissioned
-            )
+        if len(legs.torque_nm) == 1 and state.load_rounds < LOAD_ROUNDS:
+            self._begin_under_load(state, legs, depth)
+            return
+        if len(legs.torque_nm) == 1:
+            state.parameters = legs.parameters
+        else:
+            own = self._models.explainer(state)
+            found = identification.identified_leg(legs, own.model, own.nuisances, known)
             if not found.is_possible(self._mechanism):
                 _abandon(state)
                 return
             state.parameters = found
-            self._begin(state.parameters, modelled_m, depth, legs.profile)
+        self._begin(state.parameters, modelled_m, depth, legs.profile)
 
-    def _install(self, state: TorqueState, reference: TorqueReference) -> None:
-        """Use a new reference at its cadence.
+    def _install(self, state: TorqueState, reference: TorqueReference) -> bool:
+        """Use a new reference at the present cadence; return whether it is used.
 
         A reference with identified parameters must explain the leg at least as well as the former one;
         otherwise the former one stays, and the identification ends.
         """
-        state.turn_towards(reference.profile)
-        before, misfit_before = state.reference, self._models.misfit(state)
-        if before is None or not before.profile.is_like(reference.profile):
-            state.begin_cadence(reference)
-            return
+        before, misfit_before, sensor = state.reference, self._models.misfit(state), state.sensor
+        if before is None:
+            raise RuntimeError("there is no reference yet")
         state.reference = reference
-        own, former, sensor = reference.parameters, before.parameters, state.sensor
+        own, former = reference.parameters, before.parameters
         is_new_load = not np.array_equal(own.load, former.load)
         if is_new_load and sensor is not None and state.commissioned is not None:
             # the channel was found without the load, which hides load friction
             state.sensor = self._models.channel(reference, sensor, state.commissioned)
         if own == former or self._models.misfit(state) <= misfit_before:
-            return
+            return True
         state.reference, state.sensor = before, sensor
-        state.is_final, state.rounds = True, ROUNDS
-        # other cadences may use the identified parameters; if none does, they are withdrawn
-        if all(one.reference.parameters != state.parameters for one in state.set_aside):
-            state.parameters = before.parameters
+        state.rounds, state.parameters = ROUNDS, former
+        self.simulated = tuple(one for one in self.simulated if one is not reference)
+        return False
+
+
+def _mean_motion(cycles: Sequence[SignedCycle]) -> CrankProfile:
+    """Mean motion of the crank in some gait cycles."""
+    return mean_profile([cycle.profile for cycle in cycles])
 
 
 def _is_far(reference: TorqueReference, modelled_m: Floats) -> bool:

@@ -1,7 +1,7 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any, NamedTuple
 
@@ -32,7 +32,7 @@ from leg_wear_monitor.twin.sample import (
     newest,
     of_crank,
 )
-from leg_wear_monitor.twin.torque_reference import CADENCES, TorqueReference
+from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 # Samples of the crank and of the drive torque, kept until their gait cycle ends.
 
@@ -123,7 +123,7 @@ class Diagnosis:
         estimated clearance contains this error in addition to its own.
     changes : tuple of Change
         Significant departures, the oldest first: corrections of modelled clearances, and, if the state is
-        CHANGED, changes of the interim, and the change that is not settled yet.
+        CHANGED, the change that is not settled yet.
     channel : Channel
         Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
         nothing before.
@@ -231,47 +231,6 @@ def temperature_of(cycles: Sequence[SignedCycle]) -> float:
     return mean_of(np.array([cycle.temperature_c for cycle in cycles], float))
 
 
-@attrs.frozen(eq=False)
-class Interim:
-    """A leg with a lasting change that is no clearance: joints that open then are detected on top of it.
-
-    Attributes
-    ----------
-    changes : tuple of Change
-        Changes, the oldest first; empty until they are known again in a further run.
-    baseline : CommissionedTorque
-        Baseline of the gait cycles since the change.
-    """
-
-    changes: tuple[Change, ...]
-    baseline: CommissionedTorque
-
-
-@attrs.frozen(eq=False)
-class AtCadence:
-    """Knowledge of a leg at one cadence, more precisely under one motion of the crank.
-
-    Attributes
-    ----------
-    reference : TorqueReference
-    sensor : TorqueSensor
-        With the channel and the noise that were found with the reference.
-    commissioned : CommissionedTorque or None
-    cycles : tuple of SignedCycle
-        The last gait cycles.
-    is_final : bool
-        True if a reference with the identified parameters explained the leg less well.
-    interim : Interim or None
-    """
-
-    reference: TorqueReference
-    sensor: TorqueSensor
-    commissioned: CommissionedTorque | None = None
-    cycles: tuple[SignedCycle, ...] = ()
-    is_final: bool = False
-    interim: Interim | None = None
-
-
 @attrs.define
 class TorqueState:
     """State of a `TorqueObserver`, its reference run aside.
@@ -294,14 +253,8 @@ class TorqueState:
         Modelled clearances that the detector compares with.
     commissioned : CommissionedTorque or None
         At the reference's cadence.
-    is_final : bool
-        As in `AtCadence`.
-    interim : Interim or None
-        The interim with which gait cycles are compared instead of the baseline.
-    set_aside : tuple of AtCadence
-        Other cadences, the last one first.
     baselines : tuple of CommissionedTorque
-        Baselines of the ledger whose cadence was not walked yet, and baselines of other sensors.
+        Baselines of other cadences and of other sensors, the last one first.
     detector : DetectorState or None
     fit : ClearanceFit or None
     fit_cycles : int
@@ -313,9 +266,7 @@ class TorqueState:
     changes : tuple of Change
         Unsettled changes; the last one is being observed.
     settled : tuple of Change
-        Changes that corrected the modelled clearances, and a change that a measurement contradicts.
-    measured : tuple of bool
-        True if each joint was measured since a correction; empty without one.
+        Changes that corrected the modelled clearances, and sure changes from before the load changed.
     not_used : dict of str to int
         Gait cycles that were not used, by the values of `NotUsed`; replaced, never changed.
     unused : tuple of NotUsed
@@ -332,11 +283,8 @@ class TorqueState:
         Size of the load in the last gait cycles, by the twin.
     renewed_n : float
         Load under which the leg was commissioned anew; NaN before.
-    is_load_new : bool
-        True if the load has changed, and the leg is to be commissioned under a reference of the new one; a
-        baseline before that only serves to find the load, and may contain joints that opened meanwhile.
     is_load_other : bool
-        True if the foot's load differs from the reference's load: no clearance is known, and no name sure.
+        Whether the foot's load differs from the reference's load: gait cycles are not compared.
     is_identifying : bool
         True if the run simulates legs with other parameters.
     has_failed : bool
@@ -354,9 +302,6 @@ class TorqueState:
     reference: TorqueReference | None = None
     cycles: tuple[SignedCycle, ...] = ()
     commissioned: CommissionedTorque | None = None
-    is_final: bool = False
-    interim: Interim | None = None
-    set_aside: tuple[AtCadence, ...] = ()
     baselines: tuple[CommissionedTorque, ...] = ()
     detector: DetectorState | None = None
     fit: ClearanceFit | None = None
@@ -365,7 +310,6 @@ class TorqueState:
     least_m: tuple[Floats, ...] = ()
     changes: tuple[Change, ...] = ()
     settled: tuple[Change, ...] = ()
-    measured: tuple[bool, ...] = ()
     not_used: dict[str, int] = attrs.field(factory=dict)
     unused: tuple[NotUsed, ...] = ()
     off_cadence_rpm: float = math.nan
@@ -375,7 +319,6 @@ class TorqueState:
     load: GroundLoad | None = None
     carried_n: tuple[float, ...] = ()
     renewed_n: float = math.nan
-    is_load_new: bool = False
     is_load_other: bool = False
     is_identifying: bool = False
     has_failed: bool = False
@@ -421,29 +364,22 @@ class TorqueState:
 
     @property
     def is_compared(self) -> bool:
-        """True if gait cycles are tested: not before a further cadence has a baseline of its own."""
-        return self.commissioned is not None or not any(one.commissioned for one in self.set_aside)
+        """Whether gait cycles are tested: not under a different load than the reference's.
+
+        A further cadence has to have a baseline of its own before.
+        """
+        return not self.is_load_other and (self.commissioned is not None or not self.compared_at)
 
     @property
-    def known(self) -> tuple[AtCadence, ...]:
-        """All cadences with a reference, the present one first."""
-        if self.reference is None or self.sensor is None:
-            return self.set_aside
-        known = self.commissioned, self.cycles, self.is_final, self.interim
-        return AtCadence(self.reference, self.sensor, *known), *self.set_aside
+    def compared_at(self) -> tuple[CommissionedTorque, ...]:
+        """Baselines of the sensor at other cadences."""
+        sensor = self.sensor
+        return tuple(one for one in self.baselines if sensor and one.speed and one.is_of(sensor))
 
     @property
     def all_commissioned(self) -> tuple[CommissionedTorque, ...]:
-        """Baselines of all cadences."""
-        return (*(one.commissioned for one in self.known if one.commissioned), *self.baselines)
-
-    @property
-    def compared_with(self) -> tuple[TorqueSensor | None, CommissionedTorque | None]:
-        """The sensor, and the baseline with which gait cycles are compared, or the interim's baseline."""
-        if self.interim is None or self.sensor is None:
-            return self.sensor, self.commissioned
-        changed = self.interim.baseline
-        return attrs.evolve(self.sensor, channel=changed.channel), changed
+        """Baselines of all cadences, the present one first."""
+        return (self.commissioned, *self.baselines) if self.commissioned else self.baselines
 
     @property
     def corrections(self) -> tuple[Change, ...]:
@@ -451,23 +387,9 @@ class TorqueState:
         return tuple(change for change in self.settled if change.is_corrected)
 
     @property
-    def all_interims(self) -> tuple[Interim, ...]:
-        """Interims of all cadences."""
-        return tuple(one.interim for one in self.known if one.interim)
-
-    @property
-    def interim_changes(self) -> tuple[Change, ...]:
-        """Changes present in later gait cycles; at a cadence without any, changes of a different one."""
-        if self.interim is not None:
-            return self.interim.changes
-        others = next((one.interim.changes for one in self.set_aside if one.interim), ())
-        again = [(one.cause, one.subject) for one in self.changes]
-        return tuple(one for one in others if (one.cause, one.subject) not in again)
-
-    @property
     def all_changes(self) -> tuple[Change, ...]:
         """All changes, the oldest first."""
-        return self.settled + self.interim_changes + self.changes
+        return self.settled + self.changes
 
     @property
     def not_corrected(self) -> tuple[Change, ...]:
@@ -484,62 +406,38 @@ class TorqueState:
         """A baseline after a correction, of any cadence; None without one."""
         return next((one for one in self.all_commissioned if not one.is_as_modelled), None)
 
-    def know_corrected(self, sigma_m: Floats) -> None:
-        """Give the baselines after a correction, of all cadences, other standard deviations (k,) [m]."""
-        self._baselines_as(lambda one: one if one.is_as_modelled else attrs.evolve(one, sigma_m=sigma_m))
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether the last gait cycles wait for a reference of their motion."""
+        return self.reference is None or self.unused[-1:] == (NotUsed.UNLIKE,)
 
-    def at(self, profile: CrankProfile) -> AtCadence | None:
-        """A cadence other than the present one whose crank turns as in a profile."""
-        return next((one for one in self.set_aside if profile.is_like(one.reference.profile)), None)
+    def turn_to(self, reference: TorqueReference) -> None:
+        """Make the cadence of a reference the present one, with the gait cycles that waited for it.
 
-    def turn_to(self, one: AtCadence) -> None:
-        """Make a different cadence the present one; detected changes stay."""
-        self.set_aside = tuple(each for each in self.known if each is not one)[: CADENCES - 1]
-        self.reference, self.sensor, self.commissioned = one.reference, one.sensor, one.commissioned
-        self.cycles, self.is_final, self.interim, self.fit_due = one.cycles, one.is_final, one.interim, 0
-
-    def begin_cadence(self, reference: TorqueReference) -> None:
-        """Begin a new cadence with the gait cycles that waited for its reference.
-
-        It has a baseline of its own, from the ledger if there is one.
+        Changes that were reported at the former cadence stay until they are explained anew.
         """
-        if self.sensor is None:
-            raise RuntimeError("there are no samples yet")
-        own, changed = (self.take_baseline(reference.profile.speed, which) for which in (False, True))
-        cycles = tuple(one for one in self.waiting if one.profile.is_like(reference.profile))
-        interim = Interim((), changed) if own and changed else None
-        self.turn_to(AtCadence(reference, self.sensor, own, cycles, interim=interim))
-        self.waiting = ()
+        self.baselines = self.all_commissioned
+        self.reference, self.commissioned = reference, self.take_baseline(reference.profile.speed)
+        self.cycles = tuple(one for one in self.waiting if one.profile.is_like(reference.profile))
+        self.waiting, self.detector = (), None
 
-    def turn_towards(self, profile: CrankProfile) -> None:
-        """Make the cadence that was simulated the present one: the leg may walk at a different one by now."""
-        other = self.at(profile)
-        if other is not None and not (self.reference and self.reference.profile.is_like(profile)):
-            self.turn_to(other)
-
-    def take_baseline(self, speed: float, is_interim: bool = False) -> CommissionedTorque | None:
+    def take_baseline(self, speed: float) -> CommissionedTorque | None:
         """The baseline of the sensor at a speed of the crank; it is removed from the stored baselines.
-
-        With ``is_interim``, the baseline of an interim.
 
         Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
         had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
         """
         alike = (one for one in self.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE)
-        of_kind = (one for one in alike if one.is_interim is is_interim)
-        own = next((one for one in of_kind if self.sensor and one.is_of(self.sensor)), None)
+        own = next((one for one in alike if self.sensor and one.is_of(self.sensor)), None)
         self.baselines = tuple(one for one in self.baselines if one is not own)
         return own
 
     def measure_with(self, sensor: TorqueSensor) -> None:
         """Continue with a different sensor; baselines, gait cycles and results belong to the former one."""
-        self.baselines, known = self.all_commissioned, self.known
+        self.baselines = self.all_commissioned
         self.forget_cycles()
-        self.sensor, self.reference, self.interim, self.set_aside = sensor, None, None, ()
+        self.sensor, self.reference, self.commissioned = sensor, None, None
         self.detector, self.fit, self.changes, self.least_m = None, None, (), ()
-        for one in reversed(known):
-            baseline = self.take_baseline(one.reference.profile.speed)
-            self.turn_to(AtCadence(one.reference, sensor, baseline, is_final=one.is_final))
 
     def wait_with(self, cycle: SignedCycle) -> None:
         """Keep a gait cycle for a reference that is to be made, with those before that are like it.
@@ -554,40 +452,20 @@ class TorqueState:
     def surely_m(self, number: int) -> tuple[float, ...]:
         """Clearances that joints surely have by so many last fits; minus infinity where there are fewer."""
         least_m = self.least_m[-number:]
-        if len(least_m) < number or self.is_load_other:
+        if len(least_m) < number:
             return (-math.inf,) * len(self.modelled_m)
         return tuple(np.min(least_m, axis=0).tolist())
 
     def forget_cycles(self, since_ns: int = 0) -> None:
-        """Forget the gait cycles that began at a stamp or later, at all cadences."""
+        """Forget the gait cycles that began at a stamp or later."""
 
         def rest(cycles: tuple[SignedCycle, ...]) -> tuple[SignedCycle, ...]:
             return tuple(cycle for cycle in cycles if cycle.begin_ns < since_ns)
 
         self.cycles, self.waiting, self.odd = rest(self.cycles), rest(self.waiting), rest(self.odd)
-        self.set_aside = tuple(attrs.evolve(one, cycles=rest(one.cycles)) for one in self.set_aside)
 
     def forget_baselines(self, since_ns: int = 0) -> None:
         """Forget the baselines with gait cycles after a stamp, at all cadences."""
-        self._baselines_as(lambda one: None if one.stamp_ns > since_ns else one)
-
-    def forget_interims(self) -> None:
-        """Compare with the baselines again, at all cadences: the changes of the interims are over."""
-        self.interim = None
-        self.set_aside = tuple(attrs.evolve(one, interim=None) for one in self.set_aside)
-
-    def _baselines_as(self, of: Callable[[CommissionedTorque], CommissionedTorque | None]) -> None:
-        """Replace the baselines of all cadences; None forgets one."""
-
-        def interim(one: Interim | None) -> Interim | None:
-            baseline = of(one.baseline) if one else None
-            return attrs.evolve(one, baseline=baseline) if one and baseline else None
-
-        self.commissioned, self.interim = self.commissioned and of(self.commissioned), interim(self.interim)
-        self.set_aside = tuple(
-            attrs.evolve(
-                one, commissioned=one.commissioned and of(one.commissioned), interim=interim(one.interim)
-            )
-            for one in self.set_aside
-        )
-        self.baselines = tuple(filter(None, map(of, self.baselines)))
+        self.baselines = tuple(one for one in self.baselines if one.stamp_ns <= since_ns)
+        if self.commissioned is not None and self.commissioned.stamp_ns > since_ns:
+            self.commissioned = None

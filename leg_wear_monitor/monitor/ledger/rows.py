@@ -260,19 +260,13 @@ def _is_alike(speed: float, other: float) -> bool:
 def commissioned_torques(stored: Iterable[CommissionedTorque]) -> list[CommissionedTorque]:
     """Signatures of the drive torque of the present parts: the last ones of each cadence, newest first.
 
-    Those before a correction, or before it was known better, have different standard deviations. A leg with
-    a lasting change has one of its own, as long as no baseline of its cadence follows.
+    Those before a correction have different standard deviations.
     """
     found: list[CommissionedTorque] = []
-    interims: list[CommissionedTorque] = []
     for one in reversed(tuple(stored)):
-        others = found + interims if one.is_interim else found
-        is_known = any(_is_alike(one.speed, other.speed) for other in others)
-        if one.is_interim:
-            interims += [] if is_known else [one]
-            continue
         # the deviations of unknown clearances grow with them; a different correction has different ones
         if found and not np.allclose(one.sigma_m, found[0].sigma_m, rtol=0.1, atol=0.0):
             break
-        found += [] if is_known else [one]
-    return found[:CADENCES] + interims
+        if not any(_is_alike(one.speed, other.speed) for other in found):
+            found.append(one)
+    return found[:CADENCES]

@@ -9,8 +9,8 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.gross_causes import Allowed, explanation
 from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
-from leg_wear_monitor.estimate.mismatch import Allowed, explanation
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarm_specs import MISMATCH, TORQUE
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
@@ -332,9 +332,9 @@ class TorqueWatch(Observer):
 
     @property
     def explained(self) -> TorqueExplanation | None:
-        """Explanation of a torque residual; None if the diagnosis names a different cause."""
+        """Gross causes of a torque residual; None if the diagnosis names different ones."""
         explained = self.mismatch.explanation
-        return None if explained and self.diagnosis.contradicts(explained) else explained
+        return None if explained and self.diagnosis.replaces(explained) else explained
 
     @property
     def _max_friction_nm(self) -> float:

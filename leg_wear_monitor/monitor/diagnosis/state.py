@@ -190,17 +190,16 @@ class Diagnosis:
         """An error of joint k together with the error of its modelled clearance."""
         return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m
 
-    def contradicts(self, explained: TorqueExplanation) -> bool:
-        """True if the diagnosis names a different cause of a torque residual.
+    def replaces(self, explained: TorqueExplanation) -> bool:
+        """Whether the causes that the diagnosis names are in force, and not different gross causes.
 
-        The explanation compares with the model, and supposes faults of the inputs, a load or a mass.
-        The diagnosis compares with this leg as it was, and supposes more; but it does not use a torque that
-        is wrong as received.
+        The gross causes have wide priors about the model of a leg. The diagnosis has narrow ones about this
+        leg as it was, but it cannot use a torque that is wrong as received.
         """
         if explained.is_input_fault or self.state is not DiagnosisState.CHANGED:
             return False
-        own = {each.cause for each in self.changes if each.is_named and not each.is_corrected}
-        codes = {cause.fault_code for cause in own - {Cause.NOISE, Cause.UNKNOWN}}
+        causes = {each.cause for each in self.changes if each.is_named and not each.is_corrected}
+        codes = {cause.fault_code for cause in causes - {Cause.NOISE, Cause.UNKNOWN}}
         return bool(codes) and codes.isdisjoint(one.cause.fault_code for one in explained.named)
 
 

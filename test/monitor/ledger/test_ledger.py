@@ -376,7 +376,7 @@ EVENTS = [
     Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, counts=True),
     CorrectedClearance(1, "A", 1e-3, 4e-5, 1e-5, 7e-4, 0),
     Commissioned(1, ("hip",), np.zeros(1), np.arange(3.0), np.eye(3)),
-    CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80)), before=CommissionedTorque(0, *np.ones((2, 5)))),
+    CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80))),
     SimulatedReference(
         1, ("thigh", "foot"), TorqueReference(CrankProfile.steady(6.0), np.ones((2, 5)), TORQUE, LEG)
     ),

@@ -319,9 +319,9 @@ def test_one_story_of_a_torque_that_is_not_as_predicted(
 ) -> None:
     """Seen before: a dead zone of the torque sensor was friction by the diagnosis, and a mass beside it."""
     found = diagnosis(change(**{"cause": Cause.FRICTION} | values))
-    assert found.contradicts(explained(*causes, after=after)) is is_other
+    assert found.replaces(explained(*causes, after=after)) is is_other
     past = attrs.evolve(found, state=DiagnosisState.AS_MODELLED)
-    assert not past.contradicts(explained(*causes, after=after))
+    assert not past.replaces(explained(*causes, after=after))
 
 
 def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:

@@ -1,0 +1,350 @@
+"""Gross causes of a torque residual: sign, scale, timing, foot load and the mass of a body.
+
+They need no reference and no baseline, only the curve of the torque over a turn of the crank: the predicted
+curve, times a factor, with a foot load and a heavier body, turned by an angle. Each of these quantities has
+the narrow prior of a leg without a fault, or a wide prior if it is a cause. The most probable set of causes
+explains the residual, with the odds of `cause` for a further cause and for a name.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.estimate.body_torques import at_speed, body_torques
+from leg_wear_monitor.estimate.cause import (
+    SURE_LOG_ODDS,
+    SURE_OF_NAME,
+    Cause,
+    NamedCause,
+    TorqueExplanation,
+    beyond_friction,
+)
+from leg_wear_monitor.estimate.least_squares import solved
+from leg_wear_monitor.mechanism.arrays import Complex, Floats
+from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueProfile
+
+# Harmonics that are compared: higher ones are chaotic impacts, and beyond the 10 Hz of the comparison's
+# low-pass filter at 60 rpm. A slow sensor has the second number. Amplitude and phase of a harmonic count as
+# one independent number, because the errors of the model affect both.
+_HARMONICS = (10, 6)
+_LEAST_POINTS = 3  # least number of phases with samples, per harmonic
+
+_MOST_CAUSES = 3
+_SCALE_SIGMA = 0.001  # without a cause, the factor is the declared one
+_ANY, _ANY_LOAD_N = 10.0, 1.0e4  # wide priors of factor and mass, and of the load
+_MODEL_ERROR = 0.02  # fraction of the predicted RMS that even the right causes leave
+_MASS_RANGE = (-0.9, 4.0)  # possible error of a body's mass, as a fraction of it
+# bodies whose double mass changes the torque by a smaller fraction of its RMS are not supposed as causes
+_LEAST_MASS_EFFECT = 0.02
+_LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS: far below the torque of a leg in a wrong unit
+# angles that are tried, every half degree, from 0 to half a turn and then from minus half a turn to 0
+_GRID_RAD = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
+
+# Lag of the torque or offset of the crank: a lag turns the curve by an angle that grows with the speed.
+_LEAST_CYCLES = 6  # gait cycles to separate the two
+_SURE_SIGMAS = 3.0  # both are named from so many standard deviations
+_RESOLVED_SIGMAS = 6.0  # they are separated if the angle is so many standard deviations of the offset
+
+
+@attrs.frozen(kw_only=True)
+class Allowed:
+    """Deviations that a leg without a fault may have.
+
+    Attributes
+    ----------
+    lag_s : float
+        Largest lag of the torque, in both directions.
+    loads_n : (float, float)
+        Range of the foot load.
+    friction_nm : float
+        Largest constant torque that counts as friction.
+    unexplained : float
+        Fraction of the predicted RMS below which a torque counts as predicted.
+    """
+
+    lag_s: float
+    loads_n: tuple[float, float]
+    friction_nm: float
+    unexplained: float
+
+
+class _Curves(NamedTuple):
+    """Mean curves of gait cycles over the crank angle: coefficients (h,) of the harmonics from the first on.
+
+    Measured torque, predicted torque without a foot load [N m], torque per foot load [N m/N], change by a
+    double mass of each body [N m]; and means (3,) of the first three.
+    """
+
+    measured: Complex
+    predicted: Complex
+    lever: Complex
+    bodies: Mapping[str, Complex]
+    means: Floats
+
+    @property
+    def size_nm(self) -> float:
+        """RMS of the predicted torque."""
+        return math.sqrt(_inner(self.predicted, self.predicted) + float(self.means[1]) ** 2)
+
+
+def _curves_of(profiles: Sequence[TorqueProfile], bodies: Mapping[str, Floats]) -> _Curves | None:
+    """Curves of gait cycles; None with too few samples.
+
+    Parameters
+    ----------
+    profiles : sequence of TorqueProfile
+    bodies : mapping of str to (m,) array
+        Torques by a body's mass at equal steps of the crank angle from 0 [N m].
+    """
+    sums = np.sum([attrs.astuple(one, recurse=False) for one in profiles], axis=0)
+    number, angle, *torques = sums[:, sums[0] > 0.0]  # sums over the samples of each phase
+    harmonics = next((n for n in _HARMONICS if len(number) >= _LEAST_POINTS * n), 0)
+    if not harmonics:
+        return None
+    # least squares for a mean and the harmonics, since the samples need not lie at equal steps
+    turns = np.exp(1j * np.outer(angle / number, np.arange(1, harmonics + 1)))
+    matrix = np.concatenate([np.ones((len(number), 1)), turns.real, -turns.imag], axis=1)
+    weight = np.sqrt(number)[:, None]
+    found = np.linalg.lstsq(weight * matrix, weight * (np.array(torques) / number).T, rcond=1e-6)[0]
+    measured, predicted, lever = 0.5 * (found[1 : harmonics + 1] + 1j * found[harmonics + 1 :]).T
+    of_bodies = {name: np.fft.rfft(curve)[1 : harmonics + 1] / len(curve) for name, curve in bodies.items()}
+    return _Curves(measured, predicted, lever, of_bodies, found[0])
+
+
+def _inner(one: Complex, other: Complex) -> float:
+    """Mean of the product of two curves over a turn."""
+    return float(2.0 * (one @ other.conj()).real)
+
+
+def _turned(curve: Complex, angle_rad: float) -> Complex:
+    """A curve f as f(x + angle)."""
+    return np.asarray(curve * np.exp(1j * angle_rad * np.arange(1, len(curve) + 1)))
+
+
+def _slope(curve: Complex) -> Complex:
+    """Derivative of a curve by the crank angle."""
+    return np.asarray(curve * 1j * np.arange(1, len(curve) + 1))
+
+
+def _reals(curve: Complex) -> Floats:
+    """Real numbers (..., 2 h) of curves (..., h) whose products are those of the curves."""
+    return math.sqrt(2.0) * np.concatenate([curve.real, curve.imag], axis=-1)
+
+
+class _Causes(NamedTuple):
+    """Supposed causes: a reversed sign, a factor, a turned angle, a foot load, a body's mass."""
+
+    sign: int
+    is_scaled: bool
+    is_turned: bool
+    is_loaded: bool
+    body: str
+
+    @property
+    def number(self) -> int:
+        return (self.sign < 0) + self.is_scaled + self.is_turned + self.is_loaded + bool(self.body)
+
+
+@attrs.frozen(eq=False)
+class _Fit:
+    """Most probable values of some causes.
+
+    Attributes
+    ----------
+    causes : _Causes
+    x : (4,) array
+        Factor on the torque, angle [rad], foot load [N], and error of the body's mass as a fraction of it.
+    unexplained : float
+        RMS of the residual, as a fraction of the RMS of the scaled prediction.
+    unlikely : float
+        Minus the logarithm of the probability, less a constant.
+    """
+
+    causes: _Causes
+    x: Floats
+    unexplained: float
+    unlikely: float
+
+
+def explanation(
+    mechanism: Mechanism, cycles: Sequence[CycleStatistics], allowed: Allowed
+) -> TorqueExplanation | None:
+    """Explanation of the torque residual in gait cycles; None if it is small, or with too few samples."""
+    speed = float(np.mean([one.direction * TURN / one.moving_s for one in cycles]))
+    curves = _curves_of([one.torque_profile for one in cycles], _body_torques(mechanism, speed))
+    if curves is None or not curves.size_nm > 0.0:
+        return None
+    if not _inner(curves.measured, curves.measured) > (_LEAST_FACTOR * curves.size_nm) ** 2:
+        return None  # the torque does not vary: no cause follows from it
+    samples = float(np.mean([one.torque_profile.number.sum() for one in cycles]))
+    # a sample is taken as the mean over the period before it; the angle of an instant is half a period later
+    lag_rad = allowed.lag_s * abs(speed) + 0.5 * TURN / samples
+    fits = [one for causes in _possible(curves) if (one := _fit(curves, causes, lag_rad, allowed))]
+    before = next(one for one in fits if not one.causes.number)
+    if before.unexplained <= allowed.unexplained:
+        return None
+    found = _chosen(fits, allowed.unexplained)
+    best, sigma = _refined(curves, found[0] if found else before)
+    freedom = 2 * len(curves.measured)
+    factor, _, load_n, _ = best.x.tolist()
+    constant_nm = float(curves.means[0] - factor * (curves.means[1] + load_n * curves.means[2]))
+    constant_sigma_nm = best.unexplained * curves.size_nm / math.sqrt(freedom)
+    friction = math.copysign(constant_nm, constant_nm * speed * factor) / abs(factor)
+    return TorqueExplanation(
+        alternatives=tuple(_named(*_refined(curves, one), cycles) for one in found),
+        before=before.unexplained,
+        after=best.unexplained,
+        after_sigma=best.unexplained / math.sqrt(2.0 * freedom),
+        limit=allowed.unexplained,
+        speed_radps=speed,
+        bias=beyond_friction(friction, constant_sigma_nm, allowed.friction_nm),
+        cycles=len(cycles),
+    )
+
+
+def _body_torques(mechanism: Mechanism, speed: float) -> dict[str, Floats]:
+    """Torque [N m] that each body adds if its mass doubles; without bodies of little effect."""
+    found = body_torques(mechanism)
+    least = _LEAST_MASS_EFFECT * at_speed(found.own, speed).std()
+    added = zip(mechanism.bodies, at_speed(found.mass, speed), strict=True)
+    return {name: torque for name, torque in added if torque.std() > least}
+
+
+def _possible(curves: _Curves) -> Iterator[_Causes]:
+    """All sets of at most three causes; never both factor and mass, since they look too much alike."""
+    loads = (False, True) if np.any(curves.lever) else (False,)
+    factors = ((False, ""), (True, ""), *((False, name) for name in curves.bodies))
+    for sign in (1, -1):
+        for is_turned in (False, True):
+            for is_loaded in loads:
+                for is_scaled, body in factors:
+                    one = _Causes(sign, is_scaled, is_turned, is_loaded, body)
+                    if one.number <= _MOST_CAUSES:
+                        yield one
+
+
+def _fit(curves: _Curves, causes: _Causes, lag_rad: float, allowed: Allowed) -> _Fit | None:
+    """Most probable values of some causes on a grid of crank angles; None if no possible values fit."""
+    angles = _GRID_RAD if causes.is_turned else _GRID_RAD[np.abs(_GRID_RAD) <= lag_rad]
+    body = curves.bodies[causes.body] if causes.body else 0.0 * curves.lever
+    columns = _reals(np.stack([curves.predicted, curves.lever, body]))
+    turns = np.exp(-1j * np.outer(angles, np.arange(1, len(body) + 1)))
+    measured = _reals(turns * curves.measured)  # turned back
+    # least squares for factor, load and mass with their priors
+    middle_n, reach_n = 0.5 * sum(allowed.loads_n), 0.5 * (allowed.loads_n[1] - allowed.loads_n[0])
+    mean = np.array([causes.sign, causes.sign * middle_n * (not causes.is_loaded), 0.0])
+    sigma = np.array(
+        [
+            _ANY if causes.is_scaled else _SCALE_SIGMA,
+            _ANY_LOAD_N if causes.is_loaded else max(reach_n, 1.0e-6),
+            _ANY,
+        ]
+    )
+    weight = np.square(allowed.unexplained * curves.size_nm / sigma) / len(body)
+    values = np.linalg.solve(
+        columns @ columns.T + np.diag(weight), columns @ measured.T + (weight * mean)[:, None]
+    )
+    factor, load_n, mass = values[0], values[1] / values[0], values[2] / values[0]
+    rest = np.sqrt(np.square(measured - values.T @ columns).sum(axis=1)) / (np.abs(factor) * curves.size_nm)
+    narrow = np.array([not causes.is_scaled, not causes.is_loaded, False])
+    beyond = np.square((values - mean[:, None]) / sigma[:, None])[narrow].sum(axis=0)
+    unlikely = 0.5 * len(body) * np.log(rest**2 + _MODEL_ERROR**2) + 0.5 * beyond
+    is_possible = (factor * causes.sign > 0.0) & (mass > _MASS_RANGE[0]) & (mass < _MASS_RANGE[1])
+    if not is_possible.any():
+        return None
+    best = int(np.where(is_possible, unlikely, np.inf).argmin())
+    x = np.array([factor[best], angles[best], load_n[best], mass[best]])
+    return _Fit(causes, x, float(rest[best]), float(unlikely[best]) + SURE_LOG_ODDS * causes.number)
+
+
+def _chosen(fits: Sequence[_Fit], limit: float) -> list[_Fit]:
+    """The most probable causes, and as many others that explain equally well; empty if none explain more.
+
+    Of causes that explain the torque up to a limit, the fewest are enough.
+    """
+    best = min(fits, key=lambda one: one.unlikely)
+    enough = [one for one in fits if one.unexplained <= limit and one.causes.number < best.causes.number]
+    best = min(enough, key=lambda one: (one.causes.number, one.unlikely), default=best)
+    if not best.causes.number:
+        return []
+    alike = [one for one in fits if one.causes.number == best.causes.number]
+    most = limit if best.unexplained <= limit else math.inf
+    found = [one for one in alike if one.unlikely - best.unlikely < SURE_OF_NAME and one.unexplained <= most]
+    return sorted(found, key=lambda one: one.unlikely)
+
+
+def _refined(curves: _Curves, one: _Fit) -> tuple[_Fit, Floats]:
+    """A fit between the angles of the grid, and standard deviations (4,) of its values; 0 if fixed."""
+    causes, (factor, angle_rad, load_n, mass) = one.causes, one.x.tolist()
+    body = curves.bodies[causes.body] if causes.body else 0.0 * curves.lever
+    base = _turned(curves.predicted + load_n * curves.lever + mass * body, angle_rad)
+    lever, heavier = _turned(curves.lever, angle_rad), _turned(body, angle_rad)
+    columns = _reals(np.stack([base, factor * _slope(base), factor * lever, factor * heavier]))
+    # the factor of a reversed torque is refined, too, because it is reported
+    free = [causes.is_scaled or causes.sign < 0, causes.is_turned, causes.is_loaded, bool(causes.body)]
+    kept = np.flatnonzero(free)
+    residual = _reals(curves.measured - factor * base)
+    step = solved(columns[kept].T, residual) if len(kept) else np.zeros(0)
+    rest = residual - step @ columns[kept]
+    x, sigma = one.x.copy(), np.zeros(4)
+    x[kept] += step
+    scatter = float(rest @ rest) / (len(rest) - len(kept))
+    sigma[kept] = np.sqrt(scatter * np.diagonal(np.linalg.inv(columns[kept] @ columns[kept].T)))
+    unexplained = math.sqrt(float(rest @ rest)) / (abs(float(x[0])) * curves.size_nm)
+    return attrs.evolve(one, x=x, unexplained=min(unexplained, one.unexplained)), sigma
+
+
+def _named(one: _Fit, sigma: Floats, cycles: Sequence[CycleStatistics]) -> tuple[NamedCause, ...]:
+    """The causes of a fit with standard deviations (4,)."""
+    of, (factor, angle_rad, load_n, mass) = one.causes, one.x.tolist()
+    factor_sigma, angle_sigma, load_sigma, mass_sigma = sigma.tolist()
+    causes = []
+    if of.sign < 0:
+        causes.append(NamedCause(Cause.SIGN, factor, factor_sigma))
+    if of.is_scaled:
+        causes.append(NamedCause(Cause.SCALE, abs(factor), factor_sigma))
+    if of.is_turned:
+        together = NamedCause(Cause.TIMING, angle_rad, angle_sigma)
+        causes += _timing(cycles, one) or [together]
+    if of.is_loaded:
+        causes.append(NamedCause(Cause.LOAD, load_n, load_sigma))
+    if of.body:
+        causes.append(NamedCause(Cause.MASS, mass, mass_sigma, of.body))
+    return tuple(causes)
+
+
+def _timing(cycles: Sequence[CycleStatistics], best: _Fit) -> list[NamedCause]:
+    """Offset and lag from gait cycles at several speeds; empty if the speeds do not separate them."""
+    factor, angle_rad, load_n, _ = best.x.tolist()
+    turns, speeds = [], []
+    for one in cycles:
+        curves = _curves_of([one.torque_profile], {})
+        if curves is None:
+            continue
+        base = factor * _turned(curves.predicted + load_n * curves.lever, angle_rad)
+        along = _slope(base)
+        turns.append(angle_rad + _inner(curves.measured - base, along) / _inner(along, along))
+        speeds.append(one.direction * TURN / one.moving_s)
+    if len(speeds) < _LEAST_CYCLES or np.ptp(speeds) == 0.0:
+        return []
+    # angle = offset - lag * speed
+    columns = np.stack([np.ones(len(speeds)), -np.array(speeds)], axis=1)
+    found = solved(columns, np.array(turns))
+    rest = np.array(turns) - columns @ found
+    covariance = float(rest @ rest) / (len(speeds) - 2) * np.linalg.inv(columns.T @ columns)
+    causes = zip((Cause.CRANK_OFFSET, Cause.LAG), found, np.sqrt(np.diagonal(covariance)), strict=True)
+    offset, lag = (NamedCause(cause, float(value), float(sigma)) for cause, value, sigma in causes)
+    if _RESOLVED_SIGMAS * offset.sigma > abs(angle_rad):
+        return []
+    most = max(_sureness(offset), _sureness(lag))
+    return [one for one in (offset, lag) if _sureness(one) >= min(_SURE_SIGMAS, most)]
+
+
+def _sureness(one: NamedCause) -> float:
+    """Size of a value in standard deviations."""
+    return abs(one.value) / one.sigma if one.sigma else math.inf

@@ -9,7 +9,6 @@ import numpy as np
 
 from leg_wear_monitor.estimate.cause import (
     SURE_LOG_ODDS,
-    SURE_OF_NAME,
     SURE_SIGMAS,
     Cause,
     Change,
@@ -32,13 +31,9 @@ _LEAST_FACTOR = 0.7  # least size over the modelled clearance
 # factors that are tried, on the mass of a body and on the friction in the joints
 _FACTORS = {Cause.MASS: np.geomspace(0.4, 2.0, 16), Cause.JOINT_FRICTION: np.geomspace(0.25, 4.0, 16)}
 _CORNER = 1.0e200
-# fraction of the mean square: less than the residual of a delay that is 2.5 ms, a step of the search, off
+# a different sensor has to leave less than this fraction of the mean square: the residual of a delay that is
+# 2.5 ms off, a step of the search
 _LEFT = 0.5
-_LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
-_NOISE_SIGMA = 0.08  # relative error of the noise: half of the step between the tried values
-_QUIETEST = 0.01  # fraction of the square of the roughness
-_QUIETER = 0.25  # factor on a decreased noise: an opening may hide the rest of the decrease
-_ROUNDS = 2  # rounds of the search for a clearance and a noise
 # The search for two open joints tries seven sizes of each joint, a fifth apart; the sizes of the second joint
 # lie about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
 _LEAST_SECOND = 1.2  # over the modelled clearance: a smaller second opening may be an error of the model
@@ -47,16 +42,9 @@ _PAIR_SIZES, _PAIR_ROUNDS, _PAIR_STEP, _PAIR_MIDDLE = 3, 2, 0.2, 1.5
 # two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
 _NOISE_ALONE = 2.0
 
-# mean square up to which a joint is sure by itself: right names have 0.6 to 1.9, but A 3 to 15 at 0.7 and
-# 0.8 mm, G 2 to 6 at 0.50 and 0.52. Else it must be far better than the next cause. Where it is twice to four
-# times as wide as modelled, other causes look like it as well: A has odds of e^134 and more there; a mass of
-# 1 to 2.5 kg on a healthy leg e^2 to e^13, as I at 0.9 mm; B and G at 0.50 mm e^3 to e^63 in ten gait cycles,
-# as G at 0.79 to 0.86 mm; G at 0.45 and 0.50 mm with 0.48 kg on the foot e^20 to e^91, as G at 0.79 to
-# 0.84 mm. Below and above, G has e^57 to e^96 at 0.5 mm, and e^71 and more at 2 mm in a leg without a
-# baseline. Or it is so wide that its size is hardly known, and leaves such a part of the residual without it:
-# G at 2 mm, as 1.3 to 2.1 mm, 0.08 to 0.17 (2026-11-27)
-_SURE_SQUARE, _SURE_BY, _SURE_BY_AMONG_OTHERS = 2.0, 50.0, 100.0
-_WIDER, _WIDE, _OF_WIDE = 2.0, 4.0, 0.2
+# Mean square up to which a joint is sure by itself: right names have 0.6 to 1.9. Else it must be far better
+# than the next cause: masses of 1 to 2.5 kg on a healthy leg looked like a joint with odds of e^91 at most.
+_SURE_SQUARE, _SURE_BY = 2.0, 100.0
 _ANYTHING_ELSE = "something else"
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
@@ -95,49 +83,26 @@ class Nuisance:
 
 
 @attrs.frozen(eq=False)
-class OtherChannel:
-    """A different delay or low-pass of the torque sensor.
+class OtherSensor:
+    """A torque sensor with a different delay, low-pass or noise.
 
     Attributes
     ----------
-    later_s : float
-        Time by which slow changes of the torque are later than in the channel in force.
+    cause : NamedCause
+        Time by which slow changes of the torque are later than with the sensor in force, or the noise; the
+        standard deviations are half of the step between the sensors that are tried.
+    counted : float
+        Value of the sensor in force.
     column : (F,) array
         Change of the signature.
-    """
-
-    later_s: float
-    column: Floats
-
-
-@attrs.frozen(eq=False)
-class OtherNoise:
-    """More or less noise of the torque sensor.
-
-    Attributes
-    ----------
-    noise_nm : float
-        Standard deviation of a sample.
-    power : (F,) array
-        Contribution of the noise to the square of the roughness [(N m)^2]; 0 for the mean torque.
     scatter : (F,) array
         Variance of a gait cycle's signature in addition.
     """
 
-    noise_nm: float
-    power: Floats
+    cause: NamedCause
+    counted: float
+    column: Floats
     scatter: Floats
-
-    def shown(self, signature: Floats) -> Floats:
-        """Signatures (..., F) with this noise instead of the sensor's."""
-        # with less noise than the measured noise, nothing more can be left out
-        more = np.maximum(self.power * np.exp(-2.0 * signature), _QUIETEST - 1.0)
-        return np.asarray(signature + 0.5 * np.log1p(np.where(self.power == 0.0, 0.0, more)))
-
-    def variance(self, signature: Floats, cycles: int) -> Floats:
-        """Additional variance (F,) of the mean of some cycles' signatures with this noise."""
-        share = 1.0 - np.exp(2.0 * (signature - self.shown(signature)))
-        return np.asarray(self.scatter / cycles + (_NOISE_SIGMA * share) ** 2)
 
 
 @attrs.frozen(eq=False)
@@ -254,8 +219,7 @@ class Explainer:
     joints : sequence of str
     baseline : Baseline
     nuisances : sequence of Nuisance
-    channels : sequence of OtherChannel, optional
-    noises : sequence of OtherNoise, optional
+    sensors : sequence of OtherSensor, optional
     fresh_m : (k,) array, optional
         Clearances of new parts, the least that a joint can have; by default the expected leg's.
     """
@@ -266,14 +230,13 @@ class Explainer:
         joints: Sequence[str],
         baseline: Baseline,
         nuisances: Sequence[Nuisance],
-        channels: Sequence[OtherChannel] = (),
-        noises: Sequence[OtherNoise] = (),
+        sensors: Sequence[OtherSensor] = (),
         fresh_m: Floats | None = None,
     ) -> None:
         self.model, self.joints, self.baseline = model, tuple(joints), baseline
         self.nuisances = tuple(nuisances)
         self.bodies = tuple(one.subject for one in nuisances if one.cause is Cause.MASS)
-        self.channels, self.noises = tuple(channels), tuple(noises)
+        self.sensors = tuple(sensors)
         self.fresh_m = model.joints.grid[:, 0] if fresh_m is None else fresh_m
         usual = (one.spread**2 * np.outer(one.column, one.column) for one in nuisances)
         self._constant = sum(usual, baseline.covariance)  # errors that averaging over cycles does not reduce
@@ -318,13 +281,11 @@ class Explainer:
         nothing = seen.as_modelled.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
         found = [nothing]
         found += self._others(seen)
-        found += self._late(seen)
-        more, noises = self._noise(seen)
-        found += more
+        found += self._of_sensor(seen)
         for k, counted in enumerate(modelled_m.tolist()):
             one = _Quantity(Cause.CLEARANCE, self.joints[k], model.joints, k, counted)
             least, widest = min(counted, self.fresh_m[k]), max(model.joints.grid[k, -1], counted)
-            found.append(self._best(seen, one, np.geomspace(_LEAST_FACTOR * least, widest, _SIZES), noises))
+            found.append(self._best(seen, one, np.geomspace(_LEAST_FACTOR * least, widest, _SIZES)))
         bodies, friction = range(len(model.masses.grid)), range(len(model.friction.grid))
         factors = [_Quantity(Cause.MASS, self.bodies[i], model.masses, i, 1.0) for i in bodies]
         factors += [_Quantity(Cause.JOINT_FRICTION, "", model.friction, i, 1.0) for i in friction]
@@ -400,64 +361,31 @@ class Explainer:
         own = seen.covariance + scatter[:, None, None] * self.model.covariance
         return Misfits(seen.rest - change, own + error)
 
-    def _late(self, seen: _Seen) -> list[Explanation]:
-        """The best of the other channels; none where none explains.
+    def _of_sensor(self, seen: _Seen) -> list[Explanation]:
+        """The best of the other sensors; none where none explains.
 
-        A channel that changes much has a large error in each phase, and could seem to explain anything: it
-        has to explain without that error.
+        A sensor that changes much has a large error in each phase, and could seem to explain anything: it has
+        to explain without that error.
         """
-        if not self.channels:
+        if not self.sensors:
             return []
-        change = np.array([one.column for one in self.channels])
-        possible = Misfits(seen.rest - change, seen.covariance).square < _LEFT * seen.as_modelled.square
+        change = np.array([one.column for one in self.sensors])
+        scatter = np.array([one.scatter for one in self.sensors]) / seen.cycles
+        own = seen.covariance + _diagonal(np.sqrt(scatter))
+        possible = Misfits(seen.rest - change, own).square < _LEFT * seen.as_modelled.square
         if not possible.any():
             return []
-        misfits = Misfits(seen.rest - change, seen.covariance + _diagonal(MODEL_ERROR * change))
+        misfits = Misfits(seen.rest - change, own + _diagonal(MODEL_ERROR * change))
         best = int(np.where(possible, misfits.value, np.inf).argmin())
-        return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
+        return [misfits.explanation(best, self.sensors[best].cause, self.sensors[best].counted)]
 
-    def _noise(self, seen: _Seen) -> tuple[list[Explanation], Sequence[OtherNoise]]:
-        """Other noise as the cause, and the noise that is possible together with an opening.
-
-        An opened joint makes the torque rougher as well, so there is at most as much noise as without an
-        opening.
-        """
-        if not self.noises:
-            return [], ()
-        shown = np.array([one.shown(seen.expected) for one in self.noises])
-        variance = np.array([one.variance(seen.expected, seen.cycles) for one in self.noises])
-        misfits = Misfits(seen.mean - shown, seen.covariance + _diagonal(np.sqrt(variance)))
-        as_modelled = seen.as_modelled
-        known_nm = self.model.sensor.noise_nm
-        is_less = np.array([one.noise_nm for one in self.noises]) < known_nm
-        possible = misfits.square < _LEFT * as_modelled.square
-        # a decrease of noise is clear even if an opening compensates it
-        usable = possible | (is_less & (as_modelled.value - misfits.value > 2.0 * SURE_OF_NAME))
-        if not usable.any():
-            return [], ()
-        best = int(np.where(usable, misfits.value, np.inf).argmin())
-        found = self.noises[best]
-        least_nm = _QUIETER * found.noise_nm if is_less[best] else known_nm
-        beside = [one for one in self.noises if least_nm < one.noise_nm <= found.noise_nm]
-        if not possible[best]:
-            return [], beside
-        cause = NamedCause(Cause.NOISE, found.noise_nm, _NOISE_SIGMA * found.noise_nm)
-        return [misfits.explanation(best, cause, known_nm)], beside
-
-    def _best(
-        self, seen: _Seen, one: _Quantity, values: Floats, noises: Sequence[OtherNoise] = ()
-    ) -> Explanation:
-        """Best of some values (n,) of a quantity, all else as modelled, with other noise if any."""
-        noise = None
-        for _ in range(_ROUNDS if noises else 0):  # from the most noise on
-            value = values[self._misfits(seen, one, values, noise or noises[-1]).value.argmin()]
-            each = [self._misfits(seen, one, np.array([value]), other).value[0] for other in (None, *noises)]
-            noise = (None, *noises)[int(np.argmin(each))]
-        misfits = self._misfits(seen, one, values, noise).value
+    def _best(self, seen: _Seen, one: _Quantity, values: Floats) -> Explanation:
+        """Best of some values (n,) of a quantity, all else as modelled."""
+        misfits = self._misfits(seen, one, values).value
         best = int(misfits.argmin())
         log_value, sigma = _vertex(np.log(values), misfits, best)
         value = float(np.exp(log_value))
-        square = float(self._misfits(seen, one, np.array([value]), noise).square[0]) / len(seen.mean)
+        square = float(self._misfits(seen, one, np.array([value])).square[0]) / len(seen.mean)
         poor = max(1.0, square)  # the square of Birge's ratio
         # values far from the best one may fit almost as well: then the mean of all. Where none fits, the
         # model is off by as much in neighbouring phases, which then are few independent numbers
@@ -472,23 +400,17 @@ class Explainer:
             value=value,
             sigma=float(np.hypot(own, MODEL_ERROR * (value - one.counted))),
             counted=one.counted,
-            misfit=float(misfits[best]) + (2.0 * SURE_OF_NAME if noise else 0.0),  # penalty of a second cause
+            misfit=float(misfits[best]),
             square=square,
         )
 
-    def _misfits(self, seen: _Seen, one: _Quantity, values: Floats, noise: OtherNoise | None) -> "Misfits":
-        """How well some values (n,) of a quantity explain, with other noise or the sensor's own."""
+    def _misfits(self, seen: _Seen, one: _Quantity, values: Floats) -> "Misfits":
+        """How well some values (n,) of a quantity explain."""
         tried, which = np.append(values, one.counted), np.full(len(values) + 1, one.number)
         at, variance = one.changes.at(tried, which)[0], one.changes.scatter_at(tried, which)
-        shown, scatter = seen.expected + at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
-        before, own = seen.expected, seen.covariance
-        if noise is not None:
-            own = own + np.diag(noise.variance(before, seen.cycles))
-            shown, before = noise.shown(shown), noise.shown(before)
-        error = MODEL_ERROR * _nearby(shown - before)
-        return Misfits(
-            seen.mean - shown, own + scatter[:, None, None] * self.model.covariance + _diagonal(error)
-        )
+        change, scatter = at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
+        own = seen.covariance + scatter[:, None, None] * self.model.covariance
+        return Misfits(seen.rest - change, own + _diagonal(MODEL_ERROR * _nearby(change)))
 
     def _others(self, seen: _Seen) -> list[Explanation]:
         """Best values of the nuisances, each with the spread by which it is most probable.
@@ -658,9 +580,6 @@ def with_doubt(change: Change, explanations: Sequence[Explanation]) -> Change:
     """
     if change.cause is not Cause.CLEARANCE:
         return change
-    best, nothing, times = explanations[0], as_modelled(explanations), change.value / change.counted
-    needed = _SURE_BY_AMONG_OTHERS if _WIDER <= times < _WIDE else _SURE_BY
-    is_apart = best.square <= _SURE_SQUARE or change.runner_up_log_odds >= needed
-    if is_apart or (times >= _WIDE and best.square <= _OF_WIDE * nothing.square):
+    if explanations[0].square <= _SURE_SQUARE or change.runner_up_log_odds >= _SURE_BY:
         return change
     return attrs.evolve(change, runner_up=_ANYTHING_ELSE, runner_up_log_odds=0.0)

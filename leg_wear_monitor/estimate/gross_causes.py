@@ -189,7 +189,7 @@ def explanation(
     if before.unexplained <= allowed.unexplained:
         return None
     found = _chosen(fits, allowed.unexplained)
-    best, sigma = _refined(curves, found[0] if found else before)
+    best, _ = _refined(curves, found[0] if found else before)
     freedom = 2 * len(curves.measured)
     factor, _, load_n, _ = best.x.tolist()
     constant_nm = float(curves.means[0] - factor * (curves.means[1] + load_n * curves.means[2]))

@@ -1,17 +1,18 @@
 """The expected leg: changes of its torque's signature besides clearances, and its baseline."""
 
+import math
+
 import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.body_torques import body_torques
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.explanations import (
     Baseline,
     Explainer,
     LeftOut,
     Nuisance,
-    OtherChannel,
-    OtherNoise,
+    OtherSensor,
 )
 from leg_wear_monitor.estimate.signature import (
     CommissionedTorque,
@@ -48,6 +49,8 @@ _SCALE_STEP, _OFFSET_STEP_RAD, _LOAD_FRICTION_STEP = 0.1, 0.03, 0.05
 _MASS_STEP, _LENGTH_STEP = 0.05, 0.005
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
+_LATE_S = 0.005 * np.arange(0.5, 6.0)  # with a slower low-pass
+_LATE_SIGMA_S = 0.0015  # about half of the step
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
 _NOISE_STEP = 0.16  # step of the noise's logarithm
 _NOISE = 0.001 * np.exp(_NOISE_STEP * np.arange(40))  # fractions of the torque's size
@@ -103,40 +106,34 @@ def _loads(linkage: Linkage, known: Floats, simulated: SimulatedSensor) -> list[
     ]
 
 
-def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:
-    """Channels that a torque sensor may have instead of its own: earlier, later, filtered."""
-    own = simulated_signatures(reference, 0, sensor, cycles=_SENSOR_CYCLES).mean(axis=0)
-    present = sensor.channel
+def other_sensors(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherSensor]:
+    """Sensors that may take the place of a torque sensor: earlier, later, filtered, with other noise."""
+    present, phases = sensor.channel, sensor.phases
     slower = [one for one in _SLOWER_S if one > present.time_constant_s]
-    tried = [(late, present.time_constant_s) for late in _LATER_S] + [
-        (late, time_constant_s)
-        for time_constant_s in slower
-        for late in (0.0, *_LATER_S[_LATER_S > 0.0][::2])
+    tried = [(late, present.time_constant_s) for late in _LATER_S]
+    tried += [(late, time_constant_s) for time_constant_s in slower for late in (0.0, *_LATE_S)]
+    channels = [
+        attrs.evolve(present, delay_s=present.delay_s + later_s, time_constant_s=time_constant_s)
+        for later_s, time_constant_s in tried
     ]
-    found = []
-    for later_s, time_constant_s in tried:
-        other = attrs.evolve(present, delay_s=present.delay_s + later_s, time_constant_s=time_constant_s)
-        behind = attrs.evolve(sensor, channel=other)
-        column = simulated_signatures(reference, 0, behind, cycles=_SENSOR_CYCLES).mean(axis=0) - own
-        found.append(OtherChannel(float(other.lateness_s - present.lateness_s), column))
-    return found
+    own = simulated_signatures(reference, 0, sensor, cycles=_SENSOR_CYCLES)
 
-
-def other_noises(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherNoise]:
-    """More or less noise than a torque sensor has, in increasing order."""
-    simulated, phases = SimulatedSensor(reference, _SENSOR_CYCLES, sensor), sensor.phases
-    torque, noise = simulated.torque(0), simulated.noise(0)
-    own = simulated.signatures_of(torque + sensor.noise_nm * noise)
-    found = []
-    for noise_nm in _NOISE * sensor.size_nm:
-        if abs(np.log(noise_nm / max(sensor.noise_nm, _NOISE[0] * sensor.size_nm))) < _NOISE_STEP:
-            continue
-        each = simulated.signatures_of(torque + noise_nm * noise)
-        power = np.exp(2.0 * each.mean(axis=0)) - np.exp(2.0 * own.mean(axis=0))
-        power[:phases] = 0.0
+    def other(cause: NamedCause, counted: float, changed: TorqueSensor) -> OtherSensor:
+        each = simulated_signatures(reference, 0, changed, cycles=_SENSOR_CYCLES)
         # 20 gait cycles hardly give a variance per phase, but all phases together do
         more = (each.var(axis=0, ddof=1) - own.var(axis=0, ddof=1)).reshape(2, phases).mean(axis=1)
-        found.append(OtherNoise(float(noise_nm), power, np.repeat(np.maximum(more, 0.0), phases)))
+        scatter = np.repeat(np.maximum(more, 0.0), phases)
+        return OtherSensor(cause, counted, each.mean(axis=0) - own.mean(axis=0), scatter)
+
+    found = []
+    for channel in channels:
+        late_s = float(channel.lateness_s - present.lateness_s)
+        late = NamedCause(Cause.LAG, late_s, _LATE_SIGMA_S)
+        found.append(other(late, 0.0, attrs.evolve(sensor, channel=channel)))
+    for noise_nm in (_NOISE * sensor.size_nm).tolist():
+        if abs(math.log(noise_nm / max(sensor.noise_nm, _NOISE[0] * sensor.size_nm))) >= _NOISE_STEP:
+            noise = NamedCause(Cause.NOISE, noise_nm, 0.5 * _NOISE_STEP * noise_nm)
+            found.append(other(noise, sensor.noise_nm, attrs.evolve(sensor, noise_nm=noise_nm)))
     return found
 
 
@@ -242,8 +239,7 @@ def explainer_of(
     found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     baseline = unknown_baseline(found, sensor, model.own * model.covariance + model.places)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
-    channels, noises = other_channels(reference, sensor), other_noises(reference, sensor)
-    own = Explainer(model, joints, baseline, found, channels, noises, fresh_m)
+    own = Explainer(model, joints, baseline, found, other_sensors(reference, sensor), fresh_m)
     return own if commissioned is None else compared_with(own, commissioned)
 
 
@@ -255,4 +251,4 @@ def compared_with(own: Explainer, commissioned: CommissionedTorque) -> Explainer
     covariance = with_scatter_of(model.covariance, commissioned.signatures)
     model = attrs.evolve(model, covariance=covariance)
     baseline = commissioned_baseline(commissioned, expected, covariance, left_out, model.places)
-    return Explainer(model, own.joints, baseline, own.nuisances, own.channels, own.noises, own.fresh_m)
+    return Explainer(model, own.joints, baseline, own.nuisances, own.sensors, own.fresh_m)

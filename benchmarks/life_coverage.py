@@ -65,7 +65,7 @@ def hidden_life(leg: Mechanism, number: int) -> HiddenLife:
     clearances, factor = dict(leg.clearances), np.ones(k)
     if number:
         factor *= np.exp(USUAL_SPREAD * np.random.default_rng(1000 + seed).standard_normal(k))
-        off = SETTINGS.clearance_sigma_m * np.random.default_rng(5000 + seed).standard_normal(k)
+        off = SETTINGS.new_clearance_sigma * FRESH_M * np.random.default_rng(5000 + seed).standard_normal(k)
         for joint, more in zip(leg.clearance_joints, off.tolist(), strict=True):
             was = clearances[joint]
             clearances[joint] = attrs.evolve(was, radial_clearance=was.radial_clearance + more)
@@ -118,7 +118,7 @@ def truth_by_law(lives: list[HiddenLife], legs: int, random: np.random.Generator
 
 def lived(law: np.ndarray, off: np.ndarray, joints: int, random: np.random.Generator) -> HiddenLife:
     factor = np.exp(USUAL_SPREAD * random.standard_normal(joints))
-    fresh = FRESH_M + SETTINGS.clearance_sigma_m * random.standard_normal(joints)
+    fresh = FRESH_M + SETTINGS.new_clearance_sigma * FRESH_M * random.standard_normal(joints)
     own = factor * np.exp(off * random.standard_normal(joints))
     clearance, cycles, growth = [fresh], [0.0], []
     while True:

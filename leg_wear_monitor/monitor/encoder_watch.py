@@ -1,5 +1,6 @@
 """Further encoders in the monitor: their results go into reports, forecast and ledger."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import attrs
@@ -104,12 +105,15 @@ class EncoderWatch(Observer):
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
-        """Clearance of each joint estimated from encoders; None if it is not observable."""
+        """Clearance that is seen of each joint, None where it is not.
+
+        The encoders were commissioned with the modelled clearances, whose error is in each estimate.
+        """
         return [
-            KnownClearance("encoders", one.clearance_m, one.sigma_m)
+            KnownClearance("encoders", one.clearance_m, math.hypot(one.sigma_m, tolerance_m))
             if one.observation is ClearanceObservation.SEEN
             else None
-            for one in self.estimates or ()
+            for one, tolerance_m in zip(self.estimates or (), self._leg.tolerance_m, strict=False)
         ]
 
     @property

@@ -246,6 +246,7 @@ def faults(names: Sequence[str], state: EncoderState) -> list[str]:
 
 _CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change counts as permanent
 
+_MODEL_M = 5.0e-6  # standard deviation of a modelled clearance apart from the error of the new one
 _UNKNOWN_SIGMA_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
 _PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a reference
 # A reference is renewed if an observable clearance, or the crank's speed as a fraction of its mean, differs
@@ -482,11 +483,11 @@ class EncoderObserver(KeepsSamples):
     def _prior(self, clearance_m: Floats) -> Estimate:
         """Prior of the regression.
 
-        While encoders are commissioned, the clearances are known to within their tolerance and the uncertain
-        wear; afterwards they are practically unknown, so that the encoders alone decide.
+        While encoders are commissioned, the clearances are the modelled ones, with uncertain wear: the error
+        of a new clearance stays in all estimates. Afterwards they are practically unknown, so that the
+        encoders alone decide.
         """
-        forecast = self.config.forecast
         if not self.commissions:
             return prior_with(self.state.errors, clearance_m, _UNKNOWN_SIGMA_M)
         wear_sigma_m = self._coefficient_sigma * (clearance_m - self._new_m)
-        return prior_with(self.state.errors, clearance_m, np.hypot(forecast.clearance_sigma_m, wear_sigma_m))
+        return prior_with(self.state.errors, clearance_m, np.hypot(_MODEL_M, wear_sigma_m))

@@ -205,7 +205,7 @@ class MonitoredLeg(WearModel):
                     joint=joint,
                     label=self.mechanism.joints[joint].label,
                     modelled_m=modelled_m[k],
-                    sigma_m=diagnosis.tolerance_of_joint(k) if by_torque is None else by_torque,
+                    sigma_m=self.tolerance_m[k] if by_torque is None else by_torque,
                     limit_m=limits_m[k],
                     best_estimate_m=best_m,
                     seen=seen[k],

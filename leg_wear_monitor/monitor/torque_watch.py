@@ -45,12 +45,6 @@ _LOG = logging.getLogger(__name__)
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
 _CONTRADICTS = 3.0  # standard deviations between the torque estimate and a measurement by an operator
-# gait cycles since a part was measured that wear it little: at ten times the modelled wear of joint A of the
-# example in the air, 17 pm per gait cycle, 17 um; a correction is 90 um at least (diagnosis.md)
-_LATELY_CYCLES = 100_000
-# standard deviation of a new clearance, as a fraction: the limits of a running fit are 20 % about its mean
-_FIT_TOLERANCE = 0.1
-_LEAST_BEFORE = 3  # kept gait cycles that show a leg without a change
 _FACTORS = (Cause.SCALE, Cause.SIGN)
 
 
@@ -262,47 +256,24 @@ class TorqueWatch(Observer):
         own, contradictions = self._leg.twin.parameters, map(self._contradiction, found.changes)
         return attrs.evolve(
             found,
-            tolerance_m=self._tolerance_m,
+            tolerance_m=self._leg.tolerance_m,
             reason="; ".join(filter(None, (found.reason, self.unexplained, *contradictions))),
             bodies=self._counted_bodies(),
             friction=own.friction,
             compliance=own.compliance,
         )
 
-    @property
-    def _tolerance_m(self) -> tuple[float, ...]:
-        """Standard deviation of each modelled clearance: by the fit of the part, or by its measurement."""
-        joints, clearances = self._leg.clearance_joints, self._leg.mechanism.clearances
-        sigma_m = [_FIT_TOLERANCE * clearances[joint].radial_clearance for joint in joints]
-        return tuple(
-            min(known.sigma_m, by_fit) if known else by_fit
-            for known, by_fit in zip(self._leg.measured, sigma_m, strict=True)
-        )
-
     def _contradiction(self, change: Change) -> str:
-        """A measurement of the changed leg that contradicts the change of a clearance; empty without one.
-
-        A measurement from before the change says nothing about it. Before this run, a different clock may
-        have stamped it: it counts for the changed leg unless stored gait cycles of this run show the leg
-        before the change, or the part had walked many cycles since.
-        """
+        """A measurement of the changed leg that contradicts the change of a clearance; empty without one."""
         if change.is_corrected or change.cause is not Cause.CLEARANCE:
             return ""
         k = self._leg.clearance_joints.index(change.subject)
-        measured, own = self._leg.measured[k], self._leg.accounting
-        if measured is None:
+        measured = self._leg.measured[k]
+        if measured is None or measured.stamp_ns < change.since_ns:
             return ""
-        begun = own.cycles_before - own.parts[k].cycles
-        if measured.cycles > begun:
-            is_since = measured.stamp_ns >= change.since_ns
-        else:
-            kept = self.observer.state.cycles if self.observer else ()
-            before = sum(one.begin_ns < change.since_ns for one in kept)
-            is_since = begun - measured.cycles <= _LATELY_CYCLES and before < _LEAST_BEFORE
-        new_m = self._leg.mechanism.clearances[change.subject].radial_clearance
         apart_m = abs(measured.clearance_m - change.value)
-        sigma_m = math.hypot(measured.sigma_m, change.sigma, _FIT_TOLERANCE * new_m)
-        if not is_since or apart_m <= _CONTRADICTS * sigma_m:
+        by_fit_m = self._leg.config.forecast.new_clearance_sigma * self._leg.new_m[k]
+        if apart_m <= _CONTRADICTS * math.hypot(measured.sigma_m, change.sigma, by_fit_m):
             return ""
         return (
             f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "

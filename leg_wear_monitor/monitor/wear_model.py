@@ -82,6 +82,15 @@ class WearModel:
         """Wear of each part at some mean clearances [m]."""
         return np.asarray(clearance_m - self.new_m)
 
+    @property
+    def tolerance_m(self) -> tuple[float, ...]:
+        """Standard deviation of each modelled clearance: by the fit of the part, or by its measurement."""
+        by_fit = self.config.forecast.new_clearance_sigma
+        return tuple(
+            min(known.sigma_m, by_fit * new_m) if known else by_fit * new_m
+            for known, new_m in zip(self.measured, self.new_m, strict=True)
+        )
+
     def grows_anew(self, joints: Sequence[str]) -> None:
         """Discard the growth of some joints, because it belongs to a different leg."""
         each = zip(self.clearance_joints, self.growth, strict=True)

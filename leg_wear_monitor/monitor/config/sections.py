@@ -115,7 +115,8 @@ class Forecasting:
 
     load_sigma: float = 0.1  # for future wear per cycle, because load and pace vary
     model_sigma: float = 0.4  # for the growth without simulated lives, and beyond them (forecast.md)
-    clearance_sigma_m: float = 5.0e-6  # for a new joint's clearance
+    # for a new joint's clearance, as a fraction of it: the limits of a running fit are 20 % about its mean
+    new_clearance_sigma: float = 0.1
     duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
     duty_sigma: float = 0.2  # for the walking per day
     window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter

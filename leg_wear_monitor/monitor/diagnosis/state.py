@@ -182,10 +182,6 @@ class Diagnosis:
             return None
         return self.clearance_m[k] - self.baseline_m[k], self.sigma_m[k]
 
-    def tolerance_of_joint(self, k: int) -> float:
-        """Standard deviation of the modelled clearance of joint k; NaN where the torque is not compared."""
-        return self.tolerance_m[k] if self.tolerance_m else math.nan
-
     def with_tolerance(self, k: int, error_m: float, sigmas: float = 1.0) -> float:
         """An error of joint k together with the error of its modelled clearance."""
         return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m

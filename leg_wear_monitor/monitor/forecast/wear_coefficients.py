@@ -143,7 +143,7 @@ def known_clearances(
         Of this part, in the order of time.
     """
     return [
-        ClearanceAtWear(fresh_m, settings.clearance_sigma_m),
+        ClearanceAtWear(fresh_m, settings.new_clearance_sigma * fresh_m),
         # a correction opens the joint by far more than a rounding error of the wear
         *(
             ClearanceAtWear(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))

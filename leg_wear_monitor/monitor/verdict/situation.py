@@ -72,7 +72,7 @@ class JointSituation:
     change : (float, float) or None
         Change since the baseline by the drive torque [m], and its standard deviation.
     sigma_m : float
-        Standard deviation of the modelled clearance; NaN if the torque is not compared.
+        Standard deviation of the modelled clearance.
     is_used : bool
         True if the forecast uses the encoders' estimate of this joint.
     is_measurement_used : bool

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.forecast.forecast import Answer, GrowthLaw, JointC
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 SETTINGS = Forecasting(model_sigma=0.05)
-SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-9, duty_sigma=0.0)
+SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, new_clearance_sigma=1e-6, duty_sigma=0.0)
 NOW = JointCondition(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)
 B = attrs.evolve(NOW, joint="B", growth_m=5e-12)
 Z = statistics.NormalDist().inv_cdf(0.9)
@@ -137,7 +137,7 @@ def test_a_joint_without_a_growth_rate_leaves_the_leg_partly_known():
 def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearance_may_be():
     """Seen before: the leg was at its limit now with 10 %, of a joint that is said to be left out."""
     near = attrs.evolve(B, growth_m=None, wear_m=2.8e-4)
-    unsure = attrs.evolve(SURE, clearance_sigma_m=2e-5)
+    unsure = attrs.evolve(SURE, new_clearance_sigma=2e-5 / 3e-4)
     result = whole([NOW, near], unsure)
     assert result.joints[1].clearance_m.p90 > near.limit_m
     assert (result.leg.answer, result.leg.cycles) == (Answer.PARTLY_KNOWN, result.joints[0].cycles)

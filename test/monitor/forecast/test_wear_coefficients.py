@@ -20,7 +20,8 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 
-FRESH, PRIOR = 3.0e-4, Forecasting()
+FRESH = 3.0e-4
+PRIOR = Forecasting(new_clearance_sigma=5e-6 / FRESH)
 CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
 HOUR = 3_600_000_000_000
 
@@ -46,7 +47,7 @@ def test_without_a_measurement_the_belief_is_the_lognormal_prior():
 
 @given(st.floats(0.3, 3.0))
 def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
-    exact = attrs.evolve(PRIOR, clearance_sigma_m=1e-7)
+    exact = attrs.evolve(PRIOR, new_clearance_sigma=1e-7 / FRESH)
     wear = 1e-4
     coefficient_estimate = estimate_coefficient(
         exact, FRESH, [ClearanceAtWear(FRESH + factor * wear, 5e-6, wear)]
@@ -64,7 +65,7 @@ def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(pow
         ClearanceAtWear(FRESH + factor * 1e-4, sigma, 1e-4),
     ]
     coefficient_estimate = estimate_coefficient(
-        attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, observations
+        attrs.evolve(PRIOR, new_clearance_sigma=1e-3 / FRESH), FRESH, observations
     )
     spread = sigma * math.sqrt(2.0) / (factor * 1e-4)
     p10, p50, p90 = np.exp(coefficient_estimate.log_factors((0.1, 0.5, 0.9)))
@@ -118,7 +119,7 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     """Probability integral transform: figures drawn from the belief fall evenly into it."""
     random, wear = np.random.default_rng(3), 6e-5
     coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
-    drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
+    drawn = FRESH + PRIOR.new_clearance_sigma * FRESH * random.standard_normal(400)
     drawn += wear * np.exp(USUAL_SPREAD * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
     below = [coefficient_estimate.probability_below(ClearanceAtWear(c, 5e-6, wear)) for c in drawn]
@@ -181,7 +182,7 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
 @given(st.floats(0.02, 3.0), st.floats(-1.0, 60.0), st.floats(0.1, 10.0))
 def test_the_estimate_is_its_prior_times_the_likelihood(sigma, factor, own):
     """Against a sum over a wide and fine grid."""
-    exact = Forecasting(clearance_sigma_m=1e-9)
+    exact = Forecasting(new_clearance_sigma=1e-9 / FRESH)
     observation = ClearanceAtWear(3.0e-4 + factor * 1e-5, own * 1e-5, 1e-5)
     found = estimate_coefficient(exact, 3.0e-4, [observation], CoefficientPrior(sigma=sigma))
     u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)

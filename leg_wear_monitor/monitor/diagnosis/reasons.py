@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.references import (
@@ -106,21 +105,9 @@ def _doubt_of_known_leg(state: TorqueState, joints: Sequence[str]) -> str:
 def other_sensor(state: TorqueState) -> str:
     """Message that a baseline is from a different sensor than the present one; empty otherwise."""
     sensor = state.sensor
-    if sensor is None or state.commissioned is not None:
+    if sensor is None or state.commissioned is not None or all(one.is_of(sensor) for one in state.baselines):
         return ""
-    other = next((one for one in state.baselines if not one.is_of(sensor)), None)
-    if other is None:
-        return ""
-    now = _sampled(sensor, sensor.phases)
-    then = "unknown" if math.isnan(other.period_s) else _sampled(other, other.signatures.shape[1] // 2)
-    return f"the baseline has a different torque sensor ({then}; now {now}): the leg is commissioned again"
-
-
-def _sampled(one: TorqueSensor | CommissionedTorque, phases: int) -> str:
-    """How a torque is sampled, such as ``1000 Hz, means, 5 averaged, 80 phases``."""
-    together = f", {one.together} averaged" if one.together > 1 else ""
-    kind = "instants" if one.is_instant else "means"
-    return f"{1.0 / one.period_s:.0f} Hz, {kind}{together}, {phases} phases"
+    return "the baseline has a torque sensor with a different rate or sampling: the leg is commissioned again"
 
 
 def _not_compared(state: TorqueState) -> str:

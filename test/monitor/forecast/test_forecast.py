@@ -71,15 +71,17 @@ def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
 
 
 def test_a_measurement_narrows_and_moves_the_forecast():
+    """The part was measured when it was new: else the error of its fit is in the first measurement."""
     now = attrs.evolve(NOW, wear_m=6e-5)
     before = alone(now)
-    after = alone(now, observations=[ClearanceAtWear(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
+    when_new = ClearanceAtWear(3e-4, 5e-6, 0.0)
+    after = alone(now, observations=[when_new, ClearanceAtWear(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
     assert after.cycles.p50 < 0.75 * before.cycles.p50
     lives = [math.log(one.cycles.p90 / one.cycles.p10) for one in (before, after)]
     assert lives[1] < lives[0] / 3.0
     widths_m = [one.clearance_m.p90 - one.clearance_m.p10 for one in (before, after)]
     assert widths_m[1] < 0.2 * widths_m[0]
-    assert after.measurements == 1
+    assert after.measurements == 2
 
 
 @pytest.mark.parametrize(

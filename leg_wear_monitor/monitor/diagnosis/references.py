@@ -5,6 +5,7 @@ joint. `LegModels` computes the models that follow from a reference and the stat
 `References` decides which reference is used, and simulates it.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -60,20 +61,7 @@ _UNLIKE_ON_GROUND = 2.0
 # misfit up to which a clearance is corrected: I was taken for J at 0.68, and J for I at 0.78
 CORRECTED_TO = 0.65
 
-_MOST_KEPT = 6  # latest sets of models: of the last cadences, sensors and baselines
-
-
-@attrs.define(eq=False)
-class _ModelsOfState:
-    """Models of one reference, sensor and baseline; the last three are computed when first used."""
-
-    reference: TorqueReference
-    sensor: signature.TorqueSensor
-    commissioned: signature.CommissionedTorque | None
-    explainer: Explainer
-    misfit: float | None = None
-    modelled_m: Floats | None = None
-    detector: ChangeDetector | None = None
+_MOST_KEPT = 3  # latest sets of models: a baseline or a sensor that is tried, and the former one
 
 
 class LegModels:
@@ -88,7 +76,10 @@ class LegModels:
 
     def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
         self._mechanism, self._figures = mechanism, figures
-        self._kept: list[_ModelsOfState] = []
+        kept = functools.lru_cache(maxsize=_MOST_KEPT)
+        self._explainer_of = kept(functools.partial(explainer_of, mechanism))
+        self._misfit_of = kept(_misfit_of)
+        self._detector_of_last: tuple[Explainer, Floats, ChangeDetector] | None = None
         self._first: tuple[tuple[TorqueReference, int], Explainer] | None = None
 
     def warm_up(self) -> None:
@@ -97,15 +88,17 @@ class LegModels:
 
     def explainer(self, state: TorqueState) -> Explainer:
         """Possible explanations of the measured torque: other clearances and other causes."""
-        return self._of(state).explainer
+        if state.reference is None or state.sensor is None:
+            raise RuntimeError("there is no reference yet")
+        return self._explainer_of(state.reference, state.sensor, state.commissioned)
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests for a change of the modelled clearances."""
-        own = self._of(state)
-        if own.detector is None or own.modelled_m is not state.modelled_m:
-            own.detector = self._detector(own.explainer, state, config)
-            own.modelled_m = state.modelled_m
-        return own.detector
+        own, modelled_m = self.explainer(state), state.modelled_m
+        last = self._detector_of_last
+        if last is None or last[0] is not own or last[1] is not modelled_m:
+            last = self._detector_of_last = own, modelled_m, self._detector(own, state, config)
+        return last[2]
 
     def _detector(self, explainer: Explainer, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
@@ -152,10 +145,7 @@ class LegModels:
         commissioned = state.commissioned
         if state.reference is None or commissioned is None or not commissioned.is_as_modelled:
             return 0.0
-        own = self._of(state)
-        if own.misfit is None:
-            own.misfit = misfit(own.explainer.model, own.explainer.nuisances, commissioned)
-        return own.misfit
+        return self._misfit_of(self.explainer(state), commissioned)
 
     def channel(
         self, reference: TorqueReference, sensor: signature.TorqueSensor, known: signature.CommissionedTorque
@@ -178,11 +168,11 @@ class LegModels:
 
     def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
         """Force of the ground on the commissioned leg; the reference may have a different force."""
-        own, known, sensor = self._of(state), state.commissioned, state.sensor
+        own, known, sensor = self.explainer(state), state.commissioned, state.sensor
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
         linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
-        model, columns = own.explainer.model, own.explainer.nuisances
+        model, columns = own.model, own.nuisances
         covariance = model.covariance * (1.0 / known.cycles + model.own)
         return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
 
@@ -200,18 +190,9 @@ class LegModels:
         is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
         return not state.is_load_other and self.is_of_file(state) and is_near and not state.is_narrow
 
-    def _of(self, state: TorqueState) -> _ModelsOfState:
-        """Models of a state: kept ones if its reference, sensor and baseline are the same, or new ones."""
-        reference, sensor, known = state.reference, state.sensor, state.commissioned
-        if reference is None or sensor is None:
-            raise RuntimeError("there is no reference yet")
-        for one in self._kept:
-            if one.reference is reference and one.commissioned is known and one.sensor == sensor:
-                return one
-        explainer = explainer_of(self._mechanism, reference, sensor, known)
-        made = _ModelsOfState(reference, sensor, known, explainer)
-        self._kept = [made, *self._kept][:_MOST_KEPT]
-        return made
+
+def _misfit_of(own: Explainer, commissioned: signature.CommissionedTorque) -> float:
+    return misfit(own.model, own.nuisances, commissioned)
 
 
 # The choice of the reference, its simulation in the background, and the identification of the leg.

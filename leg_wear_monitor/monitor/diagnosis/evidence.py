@@ -113,9 +113,14 @@ class Evidence:
         deviation. A second joint that opened as well would have explained the change better; the error of
         the fit of all clearances tells how far it may have opened.
         """
-        known, k = state.commissioned, self._models.explainer(state).joints.index(change.subject)
+        known, own, before_m = state.commissioned, self._models.explainer(state), state.modelled_m
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
-        sigma_m = state.fit.sigma_m.copy() if known and state.fit else modelled_m.copy()
+        sigma_m = modelled_m.copy()  # not known
+        if known is not None:
+            mean, starts = state.signatures.mean(axis=0), starts_of(own, change, before_m)
+            fit = best_fit(own, mean, len(state.cycles), before_m, starts, known.sigma_m)
+            sigma_m = np.hypot(fit.sigma_m, fit.clearance_m - before_m)
+        k = own.joints.index(change.subject)
         sigma_m[k] = change.sigma
         state.forget_baselines()
         channel = known.channel if known else DIRECT
@@ -250,8 +255,7 @@ class Evidence:
         known_sigma_m = state.commissioned.sigma_m if state.commissioned else 0.0
         found = best_fit(explainer, mean, cycles, modelled_m, starts, known_sigma_m)
         found = with_rivals(found, explanations, explainer.joints)
-        is_single = change is not None and change.cause is Cause.CLEARANCE
-        if change is not None and is_single and state.commissioned is None:  # it may hide a second joint
+        if change is not None and change.cause is Cause.CLEARANCE:  # it may hide a second joint
             others = np.array([joint != change.subject for joint in explainer.joints])
             hidden = np.diag(np.where(others, found.clearance_m, 0.0) ** 2)
             found = attrs.evolve(found, covariance=found.covariance + hidden)

@@ -158,7 +158,7 @@ def explainer(first: Period, cycles: np.ndarray, sensor: TorqueSensor, scatter: 
     nuisances = [
         Nuisance(Cause.FRICTION, "", mean_column(np.sign(first.speed), sensor), FRICTION * size),
         Nuisance(Cause.SCALE, "", np.subtract(*scaled) / 0.1, SCALE),
-        Nuisance(Cause.CRANK_OFFSET, "", (later - earlier) / (2.0 * OFFSET_RAD), OFFSET_RAD),
+        Nuisance(Cause.TIMING, "", (later - earlier) / (2.0 * OFFSET_RAD), OFFSET_RAD),
         Nuisance(Cause.LOAD, "", mean_column(first.lever, sensor), 0.0),
     ]
     nuisances = [one for one in nuisances if np.abs(one.column).max() > ROUNDED]

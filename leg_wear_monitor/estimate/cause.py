@@ -41,8 +41,7 @@ class Cause(Enum):
     SEVERAL = "clearances of several joints", "CLEARANCE_CHANGED"
     SIGN = "sign of the torque sensor", "TORQUE_SIGN"
     SCALE = "scale of the torque sensor", "TORQUE_SCALE"
-    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # one speed cannot distinguish the two
-    CRANK_OFFSET = "offset of the crank encoder", "TORQUE_TIMING"
+    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
     LAG = "lag of the torque sensor", "TORQUE_TIMING"
     NOISE = "noise of the torque sensor", "TORQUE_NOISE"
     BIAS = "zero of the torque sensor", "TORQUE_BIAS"
@@ -55,7 +54,7 @@ class Cause(Enum):
     UNKNOWN = "unknown", "MECHANISM_CHANGED"
 
 
-INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG, Cause.NOISE)
+INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.LAG, Cause.NOISE)
 """Causes in the received signals, not in the leg."""
 
 
@@ -69,7 +68,7 @@ class NamedCause:
     value, sigma : float
         Clearance [m], the widest of several joints;
         measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
-        measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; standard deviation of a sample (NOISE) [N m];
+        measured angle (TIMING) [rad]; lag [s]; standard deviation of a sample (NOISE) [N m];
         constant torque beyond the bounds of friction,
         negative where it drives (BIAS) [N m]; change of the friction [N m], or of the fraction of the
         torque that it is (LOAD_FRICTION); load at the foot [N]; fraction by which a mass, a length or
@@ -194,10 +193,8 @@ class TorqueExplanation:
     def _is_timing(self, causes: tuple[NamedCause, ...]) -> bool:
         """True if only the time of the torque is wrong as received, by a delay that is estimated."""
         wrong = [one for one in causes if _is_of_input(one)]
-        by_angle = (one.value for one in wrong if one.cause in (Cause.TIMING, Cause.CRANK_OFFSET))
-        late_s = sum(one.value for one in wrong if one.cause is Cause.LAG) - sum(by_angle) / self.speed_radps
-        is_time = all(one.cause in (Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG) for one in wrong)
-        return is_time and LEAST_DELAY_S < late_s < MOST_DELAY_S
+        late_s = -sum(one.value for one in wrong) / self.speed_radps
+        return all(one.cause is Cause.TIMING for one in wrong) and LEAST_DELAY_S < late_s < MOST_DELAY_S
 
 
 def _is_of_input(one: NamedCause) -> bool:

@@ -45,11 +45,6 @@ _LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS: far below the torque of
 # angles that are tried, every half degree, from 0 to half a turn and then from minus half a turn to 0
 _GRID_RAD = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
 
-# Lag of the torque or offset of the crank: a lag turns the curve by an angle that grows with the speed.
-_LEAST_CYCLES = 6  # gait cycles to separate the two
-_SURE_SIGMAS = 3.0  # both are named from so many standard deviations
-_RESOLVED_SIGMAS = 6.0  # they are separated if the angle is so many standard deviations of the offset
-
 
 @attrs.frozen(kw_only=True)
 class Allowed:
@@ -196,7 +191,7 @@ def explanation(
     constant_sigma_nm = best.unexplained * curves.size_nm / math.sqrt(freedom)
     friction = math.copysign(constant_nm, constant_nm * speed * factor) / abs(factor)
     return TorqueExplanation(
-        alternatives=tuple(_named(*_refined(curves, one), cycles) for one in found),
+        alternatives=tuple(_named(*_refined(curves, one)) for one in found),
         before=before.unexplained,
         after=best.unexplained,
         after_sigma=best.unexplained / math.sqrt(2.0 * freedom),
@@ -299,7 +294,7 @@ def _refined(curves: _Curves, one: _Fit) -> tuple[_Fit, Floats]:
     return attrs.evolve(one, x=x, unexplained=min(unexplained, one.unexplained)), sigma
 
 
-def _named(one: _Fit, sigma: Floats, cycles: Sequence[CycleStatistics]) -> tuple[NamedCause, ...]:
+def _named(one: _Fit, sigma: Floats) -> tuple[NamedCause, ...]:
     """The causes of a fit with standard deviations (4,)."""
     of, (factor, angle_rad, load_n, mass) = one.causes, one.x.tolist()
     factor_sigma, angle_sigma, load_sigma, mass_sigma = sigma.tolist()
@@ -309,42 +304,9 @@ def _named(one: _Fit, sigma: Floats, cycles: Sequence[CycleStatistics]) -> tuple
     if of.is_scaled:
         causes.append(NamedCause(Cause.SCALE, abs(factor), factor_sigma))
     if of.is_turned:
-        together = NamedCause(Cause.TIMING, angle_rad, angle_sigma)
-        causes += _timing(cycles, one) or [together]
+        causes.append(NamedCause(Cause.TIMING, angle_rad, angle_sigma))
     if of.is_loaded:
         causes.append(NamedCause(Cause.LOAD, load_n, load_sigma))
     if of.body:
         causes.append(NamedCause(Cause.MASS, mass, mass_sigma, of.body))
     return tuple(causes)
-
-
-def _timing(cycles: Sequence[CycleStatistics], best: _Fit) -> list[NamedCause]:
-    """Offset and lag from gait cycles at several speeds; empty if the speeds do not separate them."""
-    factor, angle_rad, load_n, _ = best.x.tolist()
-    turns, speeds = [], []
-    for one in cycles:
-        curves = _curves_of([one.torque_profile], {})
-        if curves is None:
-            continue
-        base = factor * _turned(curves.predicted + load_n * curves.lever, angle_rad)
-        along = _slope(base)
-        turns.append(angle_rad + _inner(curves.measured - base, along) / _inner(along, along))
-        speeds.append(one.direction * TURN / one.moving_s)
-    if len(speeds) < _LEAST_CYCLES or np.ptp(speeds) == 0.0:
-        return []
-    # angle = offset - lag * speed
-    columns = np.stack([np.ones(len(speeds)), -np.array(speeds)], axis=1)
-    found = solved(columns, np.array(turns))
-    rest = np.array(turns) - columns @ found
-    covariance = float(rest @ rest) / (len(speeds) - 2) * np.linalg.inv(columns.T @ columns)
-    causes = zip((Cause.CRANK_OFFSET, Cause.LAG), found, np.sqrt(np.diagonal(covariance)), strict=True)
-    offset, lag = (NamedCause(cause, float(value), float(sigma)) for cause, value, sigma in causes)
-    if _RESOLVED_SIGMAS * offset.sigma > abs(angle_rad):
-        return []
-    most = max(_sureness(offset), _sureness(lag))
-    return [one for one in (offset, lag) if _sureness(one) >= min(_SURE_SIGMAS, most)]
-
-
-def _sureness(one: NamedCause) -> float:
-    """Size of a value in standard deviations."""
-    return abs(one.value) / one.sigma if one.sigma else math.inf

@@ -192,7 +192,7 @@ def main() -> None:
             load, channel, off = state.load, state.sensor.channel, one.models.misfit(state)
             print(
                 f"{peak_n:.0f} N, {name}: load {load.peak_n:.0f} ± {load.peak_sigma_n:.0f} N, stance "
-                f"{load.heel_strike:.3f} to {load.toe_off:.3f}, friction {load.load_friction:.2f}; channel "
+                f"{load.heel_strike:.3f} to {load.toe_off:.3f}; channel "
                 f"{1e3 * channel.delay_s:.1f} ms, {1e3 * channel.time_constant_s:.1f} ms, "
                 f"{channel.load_friction:.2f}; misfit {off:.2f}; {summary(found) or 'nothing found'}",
                 flush=True,

@@ -75,8 +75,6 @@ class GroundLoad:
         other forces that explain almost as well.
     heel_strike, toe_off : float
         Crank angle at the start and at the end of stance, as a fraction of a turn.
-    load_friction : float
-        Friction of the drive over the size of the torque that it transmits.
     square, without : float
         Mean squares of the residual with this load and without a load, in units of its uncertainty.
     other_n : float
@@ -88,7 +86,6 @@ class GroundLoad:
     peak_sigma_n: float
     heel_strike: float
     toe_off: float
-    load_friction: float
     square: float
     without: float
     other_n: float = math.nan
@@ -190,11 +187,6 @@ class _Leg:
         vertical, along = _shapes(stance, POINTS)
         return vertical * (self._lever @ stance.up), along * (self._lever @ stance.back)
 
-    def load_friction(self, x: Floats) -> float:
-        """Friction of the drive over the size of the torque that it transmits."""
-        mean, sigma = self._friction
-        return mean + sigma * float(x[4])
-
     def means(self, x: Floats) -> Floats:
         """Mean torques (n, phases) of each phase, as the sensor shows them [N m], for parameters (n, p)."""
         torque, sizes = np.tile(self._own, (len(x), 1)), self._sizes(x)
@@ -281,7 +273,6 @@ def ground_load(
         peak_sigma_n=_UNIT_N * sigma,
         heel_strike=stance.heel_strike % 1.0,
         toe_off=stance.toe_off % 1.0,
-        load_friction=leg.load_friction(best.x),
         square=least / phases,
         without=without / phases,
         other_n=_UNIT_N * float(minima[int(others.argmax())].x[0]) if others.any() else math.nan,

@@ -33,7 +33,6 @@ import numpy as np
 from scipy import signal
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.estimate.signature import TorqueSensor, signatures
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism, Track, TrackDrive
@@ -261,7 +260,7 @@ def main() -> None:
     parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
     if options.as_of_file:
-        references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
+        references.ROUNDS = 0
         references.CORRECTED_TO = references.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])

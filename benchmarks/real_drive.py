@@ -40,7 +40,6 @@ from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE as DRIVE_TORQUE
 from leg_wear_monitor.dynamics.run import CrankMotion, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.estimate import identification
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -301,7 +300,7 @@ def main() -> None:
     parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
     if options.as_of_file:
-        references.ROUNDS, identification.UNLIKE_FILE = 0, references.NAMED_TO
+        references.ROUNDS = 0
         references.CORRECTED_TO = references.NAMED_TO
     found, leg = motors(options.folder), load_mechanism("bionic_leg")
     print_tables(options.folder / ROBOT)

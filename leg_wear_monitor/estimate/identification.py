@@ -40,8 +40,6 @@ from leg_wear_monitor.twin.torque_reference import (
     levels_of,
 )
 
-UNLIKE_FILE = 0.8  # misfit from which on the leg differs from its file (docs/explanation/diagnosis.md)
-
 # misfit from which on a leg is identified, and the misfit at which identification ends: scatter alone leaves
 # 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at 0.45 mm was 0.48
 # to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)

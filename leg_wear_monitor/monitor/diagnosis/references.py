@@ -58,7 +58,7 @@ _CHANNEL_MISFIT_FACTOR = 2.5
 # force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
-# misfit up to which a clearance is corrected: I was taken for J at 0.68, and J for I at 0.78
+# misfit up to which a leg matches, and a clearance is corrected: I was taken for J at 0.68, J for I at 0.78
 CORRECTED_TO = 0.65
 
 _MOST_KEPT = 3  # latest sets of models: a baseline or a sensor that is tried, and the former one
@@ -183,12 +183,11 @@ class LegModels:
     def is_of_file(self, state: TorqueState) -> bool:
         """True if the commissioned leg matches the mechanism file, or the identified parameters."""
         is_shape = state.is_loaded and state.rounds >= ROUNDS
-        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else identification.UNLIKE_FILE)
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else CORRECTED_TO)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """True if a clearance may be corrected: the leg is known and unchanged, its drive passes enough."""
-        is_near = self.misfit(state) < CORRECTED_TO or (state.is_loaded and state.rounds >= ROUNDS)
-        return not state.is_load_other and self.is_of_file(state) and is_near and not state.is_narrow
+        """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
+        return not state.is_load_other and self.is_of_file(state) and not state.is_narrow
 
 
 def _misfit_of(own: Explainer, commissioned: signature.CommissionedTorque) -> float:

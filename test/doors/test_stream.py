@@ -248,7 +248,7 @@ def test_counts_of_an_encoder_are_read_as_its_angle(parameters) -> None:
 @pytest.mark.chaotic
 def test_the_forecast_holds_the_time_that_a_worn_joint_then_takes(monitor_of) -> None:
     """All joints wear at half a millionth of an hour's pace; A's growth is steady, so is its forecast."""
-    limit_m = 3.2e-4
+    limit_m = 3.5e-4  # beyond the error of a new clearance
     monitor = monitor_of(
         wear_acceleration=1.0e5,
         limits__clearance_m=limit_m,

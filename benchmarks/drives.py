@@ -287,7 +287,9 @@ def main() -> None:
             one, found = watched(leg, size, rows)
             own, off = one.state.sensor, one.models.misfit(one.state)
             own = own.channel
-            channel = f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.low_pass_s:.2f} ms, {own.load_friction:.3f}"
+            channel = (
+                f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.time_constant_s:.2f} ms, {own.load_friction:.3f}"
+            )
             drive = one.state.reference.parameters
             channel += f", {1.0 / drive.compliance:.0f} N m/rad" if drive.compliance else ""
             print(f"| {name} | {channel} | {off:.2f} | {summary(found) or 'none'} |", flush=True)

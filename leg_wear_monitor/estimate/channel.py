@@ -44,7 +44,6 @@ _RANGES = {
     "delay_s": (LEAST_DELAY_S, MOST_DELAY_S, 0.0005, 0.0025, 0.0001),
     "time_constant_s": (0.0005, 0.025, 0.0005, 0.0025, 0.0001),
     "second_order": (0.0, 0.5, 0.05, 0.2, 0.01),
-    "mean_s": (0.002, 0.06, 0.001, 0.005, 0.0002),
 }
 _CYCLES = 20  # simulated gait cycles; enough for a mean signature
 # A channel has to lower the mean square of the residual by this much, compared with none: unknown masses and
@@ -55,7 +54,6 @@ _CHANNEL_IMPROVEMENT = 0.3
 # one 0.05), by at most 0.04 behind low-passes of first order and lags (n = 20).
 _IMPROVEMENT = 0.05
 _SECOND_ORDER = 0.3  # the first that is tried
-_MEANS_S = (0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05)  # tried, as late as the best of first order
 
 # Load friction, as a fraction of the transmitted torque: 0.04 in harmonic drives to 0.31 in planetary servos.
 _FRICTION_SIGMA, _MOST_FRICTION = 0.2, 0.45  # prior standard deviation about 0; largest one
@@ -295,17 +293,11 @@ def _best_channel(
     is_declared, near = 0.0 not in time_constants_s, least(others).channel
     free = ("delay_s",) if is_declared or not near.time_constant_s else ("delay_s", "time_constant_s")
     other = _refined(fit_of, near, *free)
-    if len(free) == 2 and not first_order:  # second order, or a mean, only if it is clearly better
-        late_s = other.channel.lateness_s
+    if len(free) == 2 and not first_order:  # second order only if it is clearly better
         second = attrs.evolve(other.channel, second_order=_SECOND_ORDER)
-        means = [Channel(delay_s=late_s - 0.5 * one, mean_s=one) for one in _MEANS_S]
-        mean = least(map(fit_of, means)).channel
-        better = [
-            _refined(fit_of, second, *free, "second_order"),
-            _refined(fit_of, mean, "delay_s", "mean_s"),
-        ]
-        if other.square - least(better).square > _IMPROVEMENT:
-            other = least(better)
+        better = _refined(fit_of, second, *free, "second_order")
+        if other.square - better.square > _IMPROVEMENT:
+            other = better
     return other if is_declared or other.square < direct.square - _CHANNEL_IMPROVEMENT else direct
 
 

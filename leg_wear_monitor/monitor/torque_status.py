@@ -107,7 +107,7 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values["joint_friction_factor"] = diagnosis.friction
     if diagnosis.channel != DIRECT:
         values["drive_delay_s"] = diagnosis.channel.delay_s
-        values["drive_low_pass_s"] = diagnosis.channel.low_pass_s
+        values["drive_low_pass_s"] = diagnosis.channel.time_constant_s
         values["drive_load_friction"] = diagnosis.channel.load_friction
     if diagnosis.load:
         values["foot_load_peak_n"] = or_nan(diagnosis.load.peak_n)

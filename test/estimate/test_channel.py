@@ -61,24 +61,6 @@ def test_a_low_pass_of_second_order_is_found(known, hz):
     assert found.square < 0.1
 
 
-def test_a_mean_over_some_time_is_found(known):
-    """A low-pass of first order would be 0.9 ms later."""
-    reference, sensor, columns = known
-    drive = Channel(delay_s=0.001, mean_s=0.02)
-    found = channel_of(reference, sensor, behind(known, drive), columns).channel
-    assert found.mean_s == pytest.approx(drive.mean_s, rel=0.05)
-    assert found.lateness_s == pytest.approx(drive.lateness_s, abs=0.0005)
-
-
-def test_a_mean_is_that_of_the_time_before():
-    """In closed form, of a cosine."""
-    channel, omega = Channel(mean_s=0.02), 15.0 * TURN
-    time = 0.0005 * np.arange(400)  # three periods
-    expected = (np.sin(omega * time) - np.sin(omega * (time - channel.mean_s))) / (omega * channel.mean_s)
-    np.testing.assert_allclose(channel.received(np.cos(omega * time), 0.0005, 1.0), expected, atol=1e-12)
-    assert abs(channel.response(np.array([TURN * channel.bandwidth_hz])))[0] == pytest.approx(math.sqrt(0.5))
-
-
 @pytest.mark.parametrize(("second_order", "order"), [(0.0, 1), (0.5, 2)])
 def test_low_passes_are_those_of_butterworth(second_order, order):
     time_constant_s = math.sqrt(order) / (TURN * 20.0)

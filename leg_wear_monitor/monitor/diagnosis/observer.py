@@ -449,7 +449,7 @@ class TorqueObserver(KeepsSamples):
             self._restart(state.modelled_m)
 
     def _has_moved(self, peak_n: float, cycles: int) -> bool:
-        """Whether the foot's load in the last gait cycles differed from the reference's load."""
+        """True if the foot's load in the last gait cycles differed from the reference's load."""
         state, now_n = self.state, float(np.mean(self.state.carried_n[-cycles:]))
         is_found = state.load_rounds >= LOAD_ROUNDS
         is_renewed = is_found and abs(now_n - state.renewed_n) <= _MOVED * max(now_n, _LEAST_LOAD_N)

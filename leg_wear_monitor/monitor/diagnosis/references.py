@@ -186,7 +186,7 @@ class LegModels:
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else CORRECTED_TO)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """Whether a clearance may be corrected: the leg is known, and its drive passes enough."""
+        """True if a clearance may be corrected: the leg is known, and its drive passes enough."""
         return not state.is_load_other and self.is_of_file(state) and not state.is_narrow
 
 
@@ -225,7 +225,7 @@ class References:
     Attributes
     ----------
     may_be_late : bool
-        Whether the monitor never waits for simulations, see `TorqueReferenceRun`.
+        True if the monitor never waits for simulations, see `TorqueReferenceRun`.
     simulated : tuple of TorqueReference
         References that were simulated in this run, the last one of each cadence, the newest first.
 

@@ -187,7 +187,7 @@ class Diagnosis:
         return math.hypot(error_m, sigmas * self.tolerance_m[k]) if self.tolerance_m else error_m
 
     def replaces(self, explained: TorqueExplanation) -> bool:
-        """Whether the causes that the diagnosis names are in force, and not different gross causes.
+        """True if the causes that the diagnosis names are in force, and not different gross causes.
 
         The gross causes have wide priors about the model of a leg. The diagnosis has narrow ones about this
         leg as it was, but it cannot use a torque that is wrong as received.
@@ -279,7 +279,7 @@ class TorqueState:
     renewed_n : float
         Load under which the leg was commissioned anew; NaN before.
     is_load_other : bool
-        Whether the foot's load differs from the reference's load: gait cycles are not compared.
+        True if the foot's load differs from the reference's load: gait cycles are not compared.
     is_identifying : bool
         True if the run simulates legs with other parameters.
     has_failed : bool
@@ -359,7 +359,7 @@ class TorqueState:
 
     @property
     def is_compared(self) -> bool:
-        """Whether gait cycles are tested: not under a different load than the reference's.
+        """True if gait cycles are tested: not under a different load than the reference's.
 
         A further cadence has to have a baseline of its own before.
         """
@@ -403,7 +403,7 @@ class TorqueState:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether the last gait cycles wait for a reference of their motion."""
+        """True if the last gait cycles wait for a reference of their motion."""
         return self.reference is None or self.unused[-1:] == (NotUsed.UNLIKE,)
 
     def turn_to(self, reference: TorqueReference) -> None:

@@ -9,8 +9,6 @@ from leg_wear_monitor.mechanism.arrays import Complex, Floats
 from leg_wear_monitor.mechanism.position import TURN
 
 _RIGID_NM_PER_RAD = 2.0e4  # resonance above 35 Hz, which no signature of 200 samples a cycle shows
-# delays of a drive that are estimated: from an offset of 0.13 rad at 60 rpm to a lag of 40 ms
-LEAST_DELAY_S, MOST_DELAY_S = -0.02, 0.04
 
 
 @attrs.frozen(kw_only=True)
@@ -37,7 +35,7 @@ class Channel:
 
     @property
     def lateness_s(self) -> float:
-        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
+        """Delay of slow changes of the torque by delay and low-pass together [s]."""
         return self.delay_s + self.time_constant_s
 
     @property

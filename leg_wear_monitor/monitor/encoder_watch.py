@@ -105,7 +105,7 @@ class EncoderWatch(Observer):
 
     @property
     def seen(self) -> Sequence[KnownClearance | None]:
-        """Clearance that is seen of each joint, None where it is not.
+        """Clearance of each joint estimated from encoders; None if it is not observable.
 
         The encoders were commissioned with the modelled clearances, whose error is in each estimate.
         """

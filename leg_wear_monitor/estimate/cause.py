@@ -168,7 +168,7 @@ class TorqueExplanation:
     @property
     def named(self) -> tuple[NamedCause, ...]:
         """The causes, if they are the only ones that fit and explain most of the torque residual."""
-        # with less it is a part of a cause that is not among these
+        # a smaller fraction is part of an unknown cause
         sure = len(self.alternatives) == 1 and (self.is_whole or self.after <= 0.25 * self.before)
         return self.alternatives[0] if sure else ()
 

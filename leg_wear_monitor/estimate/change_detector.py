@@ -13,7 +13,7 @@ import numpy as np
 from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer, opened
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
-# on the modelled clearance of one joint; two further tests are for a new part in a worn joint
+# factors on the modelled clearance of one joint; the two factors below 1 test for a new part in a worn joint
 FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)
 
 _LEAST_INFORMATION = 1.0e-6  # information per gait cycle below which a test shows nothing

@@ -240,7 +240,7 @@ class _Hypothesis:
 
 @attrs.frozen(eq=False)
 class _Tried(Point):
-    """A channel under way."""
+    """A channel during the search."""
 
     fit: ChannelFit
 
@@ -268,7 +268,7 @@ def _best_channel(
     """
 
     def fit_of(near: Channel) -> ChannelFit:
-        channel = attrs.evolve(near, load_friction=0.0)  # the load friction is fitted anew
+        channel = attrs.evolve(near, load_friction=0.0)  # the load friction is fitted again
         rubbing = attrs.evolve(channel, load_friction=_FRICTION_STEP)
         friction_change = (residual(channel) - residual(rubbing)) / _FRICTION_STEP
         return hypothesis.fit(channel, residual(channel), friction_change, clearances(channel))
@@ -282,7 +282,7 @@ def _best_channel(
     if frictionless.square - direct.square < _FRICTION_IMPROVEMENT:
         sigma = direct.load_friction_sigma
         direct = attrs.evolve(frictionless, channel=DIRECT, load_friction_sigma=sigma)
-    # with delay and low-pass: on a grid of both, then on from the best one
+    # search over a grid of delay and low-pass, then refine the best point
     others = []
     for time_constant_s in time_constants_s:
         low_pass = Channel(time_constant_s=time_constant_s)

@@ -1,4 +1,4 @@
-"""All clearances at once from a mean signature, with their covariance."""
+"""Fit of all clearances to a mean signature, with their covariance."""
 
 from collections.abc import Sequence
 

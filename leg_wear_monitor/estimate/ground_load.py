@@ -92,7 +92,7 @@ class GroundLoad:
 
     @property
     def is_sure(self) -> bool:
-        """True if the foot carries a load, and not only masses, friction or scatter."""
+        """True if a load at the foot explains the torque, and not masses, friction or scatter alone."""
         is_seen = self.peak_n > max(_SURE * self.peak_sigma_n, _LEAST_N)
         return is_seen and self.without > _WORSE * max(self.square, 1.0)
 

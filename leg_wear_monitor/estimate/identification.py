@@ -45,7 +45,7 @@ from leg_wear_monitor.twin.torque_reference import (
 # to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
 WORTH_IDENTIFYING, ONLY_SCATTER = 0.6, 0.45
 
-FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
+FAR_FROM_FILE = 20.0  # misfit above which the ideal torque is fitted first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about the file's bodies
 _LOG_FRICTION = 0.7  # standard deviation of the logarithm of its friction: a factor of two, greased or not

@@ -107,12 +107,12 @@ def why_not_a_crank(joint: Series) -> str:
     position = _unwrapped(joint)
     for turn, unit in ((1.0, "turns"), (360.0, "degrees")):
         travel = np.ptp(np.unwrap(joint.value, period=turn))
-        if np.ptp(joint.value) < 1.1 * turn and travel > _LEAST_TURNS * turn:  # with some noise
+        if np.ptp(joint.value) < 1.1 * turn and travel > _LEAST_TURNS * turn:  # tolerance for noise
             return f"seems to be in {unit}, wrapped to a turn. Publish radians"
     reach = float(np.ptp(position))
     if reach < _LEAST_TRAVEL_RAD:
         return f"moves by {reach:.2g} rad in all"
-    coarse = position[:: max(1, len(position) // 2000)]  # so that noise adds no path
+    coarse = position[:: max(1, len(position) // 2000)]  # smoothed, because noise would lengthen the path
     path = float(np.abs(np.diff(coarse)).sum())
     if reach < _ROCKING * path:
         return f"swings to and fro within {reach:.2g} rad"

@@ -80,7 +80,7 @@ class TorqueSensor:
         points, along = torque.shape[-1], np.sign(speed)
         omega = along * TURN * np.fft.rfftfreq(points, TURN / abs(speed) / points)
         response = self.channel.response(omega)
-        # a sample is the mean since the one before, or an instant; then of as many as are averaged
+        # a sample is the mean since the previous sample, or an instant; instants are averaged
         if not self.is_instant:
             half = 0.5 * omega * self.period_s
             response *= np.sinc(half / math.pi) * np.exp(-1j * half)

@@ -18,7 +18,7 @@ from leg_wear_monitor.mechanism.position import TURN
 
 @attrs.frozen
 class Start:
-    """A guess of how the crank follows from the joint: ratio * position + offset.
+    """Start value of the conversion from joint to crank: ratio * position + offset.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def blocks_of(pair: Pair, ratio: float) -> Blocks:
     return Blocks(first, length, length >= 0.5 * np.median(length), part[first])
 
 
-# Regression of measured on predicted torque: its terms, its parameters under way, and its columns.
+# Regression of measured on predicted torque: terms, parameters during the iteration, columns.
 
 
 PHASES = 128  # tried offsets, if a start does not give an offset
@@ -312,7 +312,7 @@ class Fit:
 
 @attrs.frozen(eq=False)
 class _Columns(Point):
-    """Parameters under way, columns (k, m) and coefficients (k,) of linear terms, columns of the motion."""
+    """Parameters during the iteration; columns (k, m) and coefficients (k,) of linear terms; motion."""
 
     state: State
     by_linear: Floats

@@ -80,7 +80,7 @@ def _need_point(mechanism: Mechanism, body: str, point: str, body_key: str, poin
     if point not in mechanism.points_of(body):
         points = ", ".join(mechanism.points_of(body)) or "none"
         raise ConfigError(
-            mechanism.source, point_key, f"body {body!r} has no point {point!r}, its points are: {points}"
+            mechanism.source, point_key, f"body {body!r} has no point {point!r}; its points are: {points}"
         )
 
 

@@ -18,7 +18,7 @@ Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one numb
 def _rises(ramp: tuple[float, float]) -> str | None:
     if ramp[0] <= ramp[1] and ramp[1] > 0.0:
         return None
-    return f"{list(ramp)} m/s does not rise to above 0 m/s"
+    return f"{list(ramp)} m/s: the second speed is not above the first and above 0 m/s"
 
 
 @attrs.frozen(kw_only=True)

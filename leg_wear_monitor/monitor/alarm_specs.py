@@ -306,8 +306,9 @@ FOOT_LOAD = (
     ),
     _foot_load(
         EXCHANGED,
-        "correlation of the foot load with the stance of the other foot, less with the stance of this foot",
-        "correlation of the vertical foot load with the stance of the other foot, less with the stance of "
+        "correlation of the foot load with the stance of the other foot, minus the same for this foot",
+        "correlation of the vertical foot load with the stance of the "
+        "other foot, minus that with the stance of "
         "this foot",
     ),
     _foot_load(

@@ -480,7 +480,8 @@ def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
         )
     if best.sigma["offset_rad"] > _SURE_RAD:
         return (
-            f"it is known to ± {best.sigma['offset_rad']:.2g} rad. Expected {_SURE_RAD:g} rad: the drive "
+            f"the zero is uncertain by {best.sigma['offset_rad']:.2g} rad. "
+            f"Expected {_SURE_RAD:g} rad: the drive "
             "torque scatters"
         )
     return ""

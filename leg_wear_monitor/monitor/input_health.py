@@ -484,7 +484,7 @@ INPUT_RULES = (
         code=JUMP,
         kind=CRANK,
         words=None,
-        why="the crank's angle jumped by {size} at {since}, and has not come back: its zero is not known",
+        why="the crank angle jumped by {size} at {since} and did not return: its zero is not known any more",
         do="check the encoder for an overflow or lost counts, set crank.offset_rad again, and restart the "
         "monitor",
     ),

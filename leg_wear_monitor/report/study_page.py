@@ -184,7 +184,7 @@ def _error_table(found: Found) -> Table:
             ]
         )
     head = [f"{title} [{unit}]" for _, title, unit, _ in known] + [
-        f"{title}, of its range" for _, title, *_ in known
+        f"{title}, fraction of its range" for _, title, *_ in known
     ]
     return Table(
         caption="Largest error against the ideal leg in one cycle", head=["", *head], rows=rows, note=note

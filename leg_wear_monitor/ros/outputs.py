@@ -118,7 +118,7 @@ class StopRecorder:
 
 
 def put(writer: "McapWriter", channel: int, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> int:
-    """Write a message, or several of equal length (n, bytes); how many it were."""
+    """Write a message, or several of equal length (n, bytes); returns their number."""
     if isinstance(raw, bytes):
         writer.write(channel, log_time_ns, raw)
         return 1

@@ -199,7 +199,7 @@ _BY_DERIVATIVE = "velocity is disturbed more than displacement, acceleration mor
 _P99 = "p99_force_n"
 
 CLAIMS = (
-    Claim("hip", "A wears less deep than B", _in_one(DEPTH, HIP, "BA")),
+    Claim("hip", "A wears less deeply than B", _in_one(DEPTH, HIP, "BA")),
     Claim("hip", "impacts are denser at A than at B", _in_one("impacts", HIP, "AB")),
     Claim(
         "hip", "the zone with half of the wear is narrower for B than for A", _in_one("zone_deg", HIP, "AB")
@@ -222,10 +222,10 @@ CLAIMS = (
     Claim("all five", "A wears deepest", _in_one(DEPTH, ALL, "AB", "AG", "AI", "AJ")),
     Claim("all five", "A wears deeper than with the hip alone", _with_all(DEPTH, "A", HIP)),
     Claim("all five", "J wears least deep", _in_one(DEPTH, ALL, "AJ", "BJ", "GJ", "IJ")),
-    Claim("all five", "J wears less deep than with the foot alone", _above(DEPTH, (FOOT, "J", ALL, "J"))),
+    Claim("all five", "J wears less deeply than with the foot alone", _above(DEPTH, (FOOT, "J", ALL, "J"))),
     Claim(
         "all five",
-        "G wears less deep than A and B, deeper than I and J",
+        "G wears less deeply than A and B, deeper than I and J",
         _in_one(DEPTH, ALL, "AG", "BG", "GI", "GJ"),
     ),
     Claim("all five", _REPEATS_LESS, _repeats(ALL, "ABG", "IJ")),

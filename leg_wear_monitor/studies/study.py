@@ -90,7 +90,8 @@ class ExponentSettings:
     )
     tolerance_m: float = quantity(
         "m",
-        "local error allowed in a step; larger errors, as of simulate, add to the growth",
+        "local error allowed in a step; larger errors, such as the "
+        "default of simulate, increase the exponent",
         within=(1.0e-15, 1.0e-6),
         default=1.0e-10,
     )

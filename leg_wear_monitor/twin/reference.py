@@ -94,7 +94,7 @@ class LegParameters:
         return is_near and self.friction > 0.0 and all(one <= _MOST_COEFFICIENT for one in coefficients)
 
     def of_bodies(self, names: Sequence[str], mechanism: Mechanism) -> "LegParameters":
-        """These, of bodies in this order, in the order of the mechanism."""
+        """The same factors, reordered from the given order of bodies to the order of the mechanism."""
         order = [names.index(name) for name in mechanism.bodies]
         return attrs.evolve(self, mass=self.mass[order], length=self.length[order])
 

@@ -189,8 +189,8 @@ MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
 _CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1, times 4/3, minus the offset with the least maximal error
-# A rest that is one step but for rounding is one step: a step of half a rest leaves as much, and which of the
-# two is longer would depend on the last bit.
+# A rest equal to one step up to rounding is one step; otherwise the last bit would decide between one and two
+# steps.
 _NEARLY = 1.0 + 1.0e-6
 _FASTEST_GROWTH = 3.0  # of a step over the previous one: no growth after a trial with too large an error
 # drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]

@@ -103,7 +103,7 @@ def find_sensor(
     near = [float(f"{part * (1.0e-9 * period_ns):.2g}") for part in _ROUNDED]
     known = {one.period_s for one in state.baselines}
     period_s = next((one for one in near if one in known), near[0])
-    # as commanded: a reference, and all of its signatures, are for one cadence
+    # cycles at the commanded cadence only, because a reference is for one cadence
     cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
     if own is None or own.period_s != period_s:
         is_instant = config.drive_torque.sampling == INSTANT

@@ -56,7 +56,10 @@ _LOG = logging.getLogger(__name__)
 # relative change from which a load has changed: the twin's mean over twenty gait cycles is within 1 % of the
 # foot's load, and up to 23 % above it where its shape was found under 100 N (2026-11-25)
 _MOVED, _LEAST_LOAD_N = 0.3, 100.0
-_ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
+_ESTIMATED_M, _ESTIMATED = (
+    1.0e-4,
+    0.2,
+)  # largest sigma of an observable clearance: absolute, fraction
 
 
 def _joined(*reasons: str) -> str:
@@ -106,7 +109,7 @@ class TorqueObserver(KeepsSamples):
         self.models = LegModels(mechanism, figures)
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
-        # references of a measured load, too, are simulated under the mean one that the torque shows
+        # references of a measured load are also simulated under the mean load that the torque shows
         self._is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
         self._up = upwards(mechanism)
         self._references = References(mechanism, self.models, whole, part, self._is_on_ground)

@@ -27,7 +27,7 @@ _CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or t
 
 
 def missing(state: TorqueState, references: References, config: MonitorConfig) -> str:
-    """Why there is no estimate."""
+    """Reason why there is no estimate."""
     if not math.isnan(state.off_cadence_rpm):
         own = config.cadence
         return (

@@ -204,7 +204,7 @@ def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
 
 
 def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:
-    """An array of finite numbers of a shape, in which None is any number but 0."""
+    """An array of finite numbers with a given shape; None stands for any length above 0."""
     found = parts[name]
     fits = len(found.shape) == len(shape) and all(
         own == wanted if wanted is not None else own > 0

@@ -80,7 +80,7 @@ def _further(was_per_pa: float, now_per_pa: float) -> str:
     if not now_per_pa > 0.0:
         return "and no further wear is modelled"
     return (
-        "the model uses the new one from now on, and the forecast keeps a measured coefficient "
+        "the model uses the new coefficient from now on, and the forecast keeps a measured one "
         f"(its factor is {was_per_pa / now_per_pa:.3g} times as large)"
     )
 

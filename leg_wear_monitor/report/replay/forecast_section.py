@@ -143,7 +143,7 @@ def _deepest(summary: ReplaySummary) -> str:
     limit = summary.clearances[name].limit_m if name in summary.clearances else None
     beside = f", {100.0 * depths[name] / limit:.2g} % of the limit of its clearance" if limit else ""
     joint = summary.leg.joint_words(name)
-    what = "The deepest wear, corrections of the clearance included,"
+    what = "The deepest wear, including corrections of the clearance,"
     return f"{what} is {factor * depths[name]:.3g} {unit}, in joint {joint}{beside}."
 
 

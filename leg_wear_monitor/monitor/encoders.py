@@ -4,14 +4,16 @@ A joint encoder, or further encoder, measures the angle of a revolute joint othe
 deviation from the angle of the ideal linkage shows clearances, once its own errors (offset, scale) are known.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor import alarm_specs
+from leg_wear_monitor.monitor.alarms import ENCODERS, worst_code
 from leg_wear_monitor.monitor.angle_regression import (
     ESTIMATED_M,
     ClearanceEstimate,
@@ -24,10 +26,18 @@ from leg_wear_monitor.monitor.angle_regression import (
 )
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
+from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
+from leg_wear_monitor.monitor.observer import Observer
+from leg_wear_monitor.monitor.reports import Status
+from leg_wear_monitor.monitor.verdict.situation import KnownClearance
+from leg_wear_monitor.monitor.wear_model import WearModel
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_profile
-from leg_wear_monitor.twin.sample import GAIT_SAMPLE, KeepsSamples, Samples, newest, of_crank, within
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, newest, of_crank, within
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 # Errors of the encoders: unknown at first, estimated together with the clearances of a leg whose clearances
@@ -50,14 +60,14 @@ class EncoderErrors:
     mean : (1 + 2 m,) array
         Offset of the crank's encoder, offsets from the centres [rad] and scale errors of the others.
     covariance : array
-    known : tuple of bool
-        True if each encoder is commissioned.
+    known : bool
+        True if the encoders are commissioned.
     """
 
     centre_rad: Floats
     mean: Floats
     covariance: Floats
-    known: tuple[bool, ...]
+    known: bool
 
 
 def names_of(encoders: Encoders) -> tuple[str, ...]:
@@ -70,39 +80,12 @@ def names_of(encoders: Encoders) -> tuple[str, ...]:
 
 
 def errors_of(encoders: Encoders, stored: Commissioned | None) -> EncoderErrors:
-    """Errors of encoders as stored in the ledger; errors of encoders that are not stored are unknown."""
-    names = names_of(encoders)
-    m = len(names)
-    centre, mean = np.full(m, np.nan), np.zeros(1 + 2 * m)
+    """Errors as stored in the ledger; unknown for other encoders than the stored ones."""
+    if stored is not None and stored.encoders == names_of(encoders):
+        return EncoderErrors(stored.centre_rad, stored.mean, stored.covariance, True)
+    m = len(encoders.names)
     sigma = np.concatenate([np.full(1 + m, _OFFSET_SIGMA_RAD), np.full(m, _SCALE_SIGMA)])
-    covariance = np.diag(np.square(sigma))
-    if stored is None:
-        return EncoderErrors(centre, mean, covariance, (False,) * m)
-    # the configuration may list other encoders than the ledger, in a different order
-    common = [(i, stored.encoders.index(name)) for i, name in enumerate(names) if name in stored.encoders]
-    here, there = [i for i, _ in common], [j for _, j in common]
-    own, theirs = _rows(here, m), _rows(there, len(stored.encoders))
-    centre[here], mean[own] = stored.centre_rad[there], stored.mean[theirs]
-    covariance[np.ix_(own, own)] = stored.covariance[np.ix_(theirs, theirs)]
-    return EncoderErrors(centre, mean, covariance, tuple(name in stored.encoders for name in names))
-
-
-def _rows(which: Sequence[int], m: int) -> list[int]:
-    """Rows of `EncoderErrors.mean`: the crank's offset, and the offsets and scale errors of some encoders."""
-    return [0, *(1 + i for i in which), *(1 + m + i for i in which)]
-
-
-def stored_errors(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commissioned:
-    """Ledger entry with the errors of the commissioned encoders."""
-    which = [i for i, known in enumerate(errors.known) if known]
-    rows = _rows(which, len(errors.known))
-    return Commissioned(
-        stamp_ns,
-        tuple(names_of(encoders)[i] for i in which),
-        errors.centre_rad[which],
-        errors.mean[rows],
-        errors.covariance[np.ix_(rows, rows)],
-    )
+    return EncoderErrors(np.full(m, np.nan), np.zeros(1 + 2 * m), np.diag(np.square(sigma)), False)
 
 
 def prior_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | float) -> Estimate:
@@ -114,55 +97,10 @@ def prior_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | flo
     return Estimate(np.concatenate([clearance_m, errors.mean]), covariance, k)
 
 
-def commissioned(errors: EncoderErrors, found: Estimate, present: Sequence[bool]) -> EncoderErrors:
-    """Errors fixed at an estimate; encoders that were present are commissioned from now on."""
+def commissioned(errors: EncoderErrors, found: Estimate) -> EncoderErrors:
+    """Errors fixed at an estimate."""
     k = found.joints
-    known = tuple(was or is_ for was, is_ in zip(errors.known, present, strict=True))
-    return EncoderErrors(errors.centre_rad, found.mean[k:], found.covariance[k:, k:], known)
-
-
-# Samples of the encoders: they arrive in pieces, and are kept until the gait cycle that they belong to is
-# evaluated.
-
-
-@attrs.frozen(eq=False)
-class EncoderSamples:
-    """Samples of the crank in the order of their arrival, with counts of unusable encoder angles.
-
-    Attributes
-    ----------
-    crank : (n,) array of GAIT_SAMPLE
-    samples, absent, no_angle : (m,) arrays of int
-        Counts since the start.
-    """
-
-    crank: Samples
-    samples: Ints
-    absent: Ints
-    no_angle: Ints
-
-    def extended(self, piece: Samples) -> "EncoderSamples":
-        """With the crank samples of a piece appended; each has the encoders' angles of the same message."""
-        piece = of_crank(piece)
-        if not len(piece):
-            return self
-        angles = piece["encoder_rad"][:, : len(self.samples)]
-        return EncoderSamples(
-            np.concatenate([self.crank, piece]),
-            self.samples + np.isfinite(angles).sum(axis=0),
-            self.absent + np.isnan(angles).sum(axis=0),
-            self.no_angle + np.isinf(angles).sum(axis=0),
-        )
-
-    def after(self, stamp_ns: int) -> "EncoderSamples":
-        """Without the samples before a stamp."""
-        return attrs.evolve(self, crank=newest(self.crank, stamp_ns))
-
-
-def no_encoder_samples(encoders: int) -> EncoderSamples:
-    """Empty samples of a number of encoders."""
-    none = np.zeros(encoders, np.int64)
-    return EncoderSamples(np.zeros(0, GAIT_SAMPLE), none, none, none)
+    return EncoderErrors(errors.centre_rad, found.mean[k:], found.covariance[k:, k:], True)
 
 
 # State of the observer (below), and the faults of an encoder.
@@ -175,12 +113,13 @@ _FAULTY_RAD = 0.1
 
 @attrs.define
 class EncoderState:
-    """State of an `EncoderObserver` besides its regression and its reference.
+    """State of an `EncoderWatch` besides its regression and its reference.
 
     Attributes
     ----------
-    samples : EncoderSamples
     errors : EncoderErrors
+    samples : Samples
+        Samples of the crank, with the encoders' angles, of gait cycles that are not evaluated yet.
     due : tuple of (int, int)
         Begin and end [ns] of ended gait cycles that are not evaluated yet.
     present : tuple of bool
@@ -203,11 +142,13 @@ class EncoderState:
         Stamp of the last forecast update with `found`, 0 if an update is due.
     other, believed : tuple of bool
         At that update: whether each clearance differed significantly from the modelled one, and whether the
-        forecast used it. Both are set by `monitor.cycle_report`.
+        forecast used it.
+    known : int
+        Number of measurements and corrections in the forecast at that update.
     """
 
-    samples: EncoderSamples
     errors: EncoderErrors
+    samples: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
     due: tuple[tuple[int, int], ...] = ()
     present: tuple[bool, ...] = ()
     changed_present: tuple[bool, ...] = ()
@@ -220,6 +161,7 @@ class EncoderState:
     updated_ns: int = 0
     other: tuple[bool, ...] = ()
     believed: tuple[bool, ...] = ()
+    known: int = 0
 
 
 def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
@@ -254,63 +196,41 @@ _PROFILE_CYCLES = 10  # gait cycles whose crank motion is averaged for a referen
 _CLEARANCE_DEPARTURE_M, _SPEED_DEPARTURE, _LEAST_BETWEEN_REFERENCES = 1.0e-4, 0.015, 100
 
 
-class EncoderObserver(KeepsSamples):
-    """Estimates clearances from joint encoders, and the errors of encoders that are not commissioned yet.
+class EncoderWatch(Observer):
+    """Watches the clearances by joint encoders; commissions encoders whose errors are unknown.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        With the parameters of the configuration applied.
-    config : MonitorConfig
-    coefficient_sigma : sequence of float
-        Prior standard deviation of the logarithm of each clearance joint's wear coefficient.
-    known : Commissioned or None
-        Stored encoder errors of the ledger.
+    leg : WearModel
+    board : AlarmBoard
+
+    Attributes
+    ----------
+    state : EncoderState
+    estimates : tuple of ClearanceEstimate or None
+        Estimates of the last gait cycle, and whether the forecast uses them.
 
     Raises
     ------
     ConfigError, AssemblyError
     """
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        config: MonitorConfig,
-        coefficient_sigma: Sequence[float],
-        known: Commissioned | None,
-    ) -> None:
-        self._coefficient_sigma = np.array(coefficient_sigma)
-        self._settings, self.config = config.encoders, config
+    def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
+        self._leg, self._board, self._config = leg, board, leg.config
+        mechanism, self._settings = leg.mechanism, leg.config.encoders
+        self._coefficient_sigma = np.array([one.prior.sigma for one in leg.forecaster.coefficient_estimates])
         self._new_m = np.array(
             [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
         )
         self._model = angle_model(mechanism, self._settings.joints)
         self._reference = AngleReferenceRun(mechanism, self._model)
-        self._clearance_regression = ClearanceRegression(self._model)
-        errors = errors_of(self._settings, known)
-        self.state = EncoderState(no_encoder_samples(len(self._settings.names)), errors)
+        self._regression = ClearanceRegression(self._model)
+        self.estimates: tuple[ClearanceEstimate, ...] | None = None
+        self.state = EncoderState(errors_of(self._settings, leg.ledger.commissioned if leg.ledger else None))
 
-    @property
-    def cycles(self) -> int:
-        """Number of gait cycles in the estimate."""
-        return self._clearance_regression.cycles
-
-    @property
-    def commissions(self) -> bool:
-        """True if the errors of some available encoder are unknown."""
-        return any(
-            here and not known
-            for here, known in zip(self.state.present, self.state.errors.known, strict=False)
-        )
-
-    @property
-    def has_failed(self) -> bool:
-        """True if there is no reference because the leg could not be simulated."""
-        return (
-            self.state.is_requested
-            and not self._reference.is_busy
-            and self._clearance_regression.reference is None
-        )
+    def configure(self, config: MonitorConfig) -> None:
+        """Use other parameters from now on."""
+        self._config = config
 
     def go_live(self) -> None:
         """Never wait for simulations."""
@@ -320,56 +240,69 @@ class EncoderObserver(KeepsSamples):
         """Stop simulating ahead: the process is about to end."""
         self._reference.leave()
 
-    def ended(self, statistics: CycleStatistics) -> None:
-        """Queue an ended gait cycle for evaluation, if the leg walked steadily at the commanded cadence."""
-        if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
-            self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
+    def add_samples(self, piece: Samples) -> None:
+        """Add samples that the twin follows."""
+        self.state.samples = np.concatenate([self.state.samples, of_crank(piece)])
 
-    def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
-        """Evaluate the queued gait cycles, and continue the simulation of the reference.
+    def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
+        """Estimate the clearances; they update the forecast each minute of stamps, or if something is new."""
+        del is_refused
+        leg, state = self._leg, self.state
+        if statistics.is_steady and self._config.cadence.allows(statistics.cadence_rpm):
+            state.due = (*state.due, (statistics.begin_ns, statistics.stamp_ns))
+        estimates = self._estimates(statistics.clearance_mean_m)
+        is_seen = [one.observation is ClearanceObservation.SEEN for one in estimates]
+        other = tuple(one.is_other for one in estimates)
+        known = len(leg.forecaster.measurements) + len(leg.forecaster.corrections)
+        is_new = other != state.other or known != state.known
+        is_due = is_new or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
+        if is_due and any(is_seen):
+            state.updated_ns, state.other, state.known = statistics.stamp_ns, other, known
+            worn_m, replaced_ns = leg.worn_m(statistics.clearance_mean_m), leg.accounting.replaced_ns
+            state.believed = tuple(
+                is_seen[k]
+                and leg.forecaster.use_estimate(
+                    k, ClearanceAtWear(one.clearance_m, one.sigma_m, float(worn_m[k])), replaced_ns[k]
+                )
+                for k, one in enumerate(estimates)
+            )
+        believed = state.believed or (False,) * len(estimates)
+        each = zip(estimates, believed, is_seen, strict=True)
+        self.estimates = tuple(attrs.evolve(one, believed=yes and seen) for one, yes, seen in each)
 
-        Parameters
-        ----------
-        clearance_m : (k,) array
-            Modelled mean clearances.
-        depth : (k, 2, N) array
-            Modelled wear [m].
-
-        Returns
-        -------
-        Commissioned or None
-            Errors of the encoders, if this period completed their commissioning.
-        """
-        new: list[Commissioned] = []
-
-        def evaluate(begin_ns: int, end_ns: int) -> None:
+    def end_period(self) -> None:
+        """Evaluate the gait cycles that ended in an evaluation period; continue to simulate the reference."""
+        state, twin, new = self.state, self._leg.twin, None
+        for begin_ns, end_ns in state.due:
             self._add_cycle(begin_ns, end_ns)
-            found = self._evaluate(end_ns)
-            new.extend([found] if found else [])
+            new = self._evaluate(end_ns) or new
+        state.samples = newest(state.samples, state.due[-1][1] if state.due else 0)
+        state.due = ()
+        self._advance_reference(twin.clearance_mean_m, twin.depth)
+        if new is not None:
+            self._leg.accounting.note(new)
 
-        self.evaluate_due(evaluate)
-        self._advance_reference(clearance_m, depth)
-        return new[-1] if new else None
-
-    def replaced(self) -> None:
-        """Forget the estimate after the replacement of a part; the errors of the encoders stay."""
-        self._clearance_regression.forget()
+    def replaced(self, k: int) -> None:
+        """Forget the estimates of the former part of joint k; the errors of the encoders stay."""
+        self._regression.forget()
         self.state.found, self.state.is_requested, self.state.updated_ns = None, False, 0
+        if self.estimates:
+            none = ClearanceEstimate(observation=ClearanceObservation.WAITING)
+            self.estimates = (*self.estimates[:k], none, *self.estimates[k + 1 :])
 
-    def estimates(self, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
+    def _estimates(self, modelled_m: Floats) -> tuple[ClearanceEstimate, ...]:
         """Clearance estimate of each joint, compared with the modelled clearances (k,) [m]."""
         found = self.state.found
-        if found is None:
-            observation = (
-                ClearanceObservation.COMMISSIONING if self.commissions else ClearanceObservation.WAITING
-            )
-            return (ClearanceEstimate(observation=observation),) * len(modelled_m)
-        return clearance_estimates(found, modelled_m)
+        if found is not None:
+            return clearance_estimates(found, modelled_m)
+        is_known = self.state.errors.known
+        observation = ClearanceObservation.WAITING if is_known else ClearanceObservation.COMMISSIONING
+        return (ClearanceEstimate(observation=observation),) * len(modelled_m)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the regression, unless other encoders are present than before."""
         state = self.state
-        kept = within(state.samples.crank, begin_ns, end_ns)
+        kept = within(state.samples, begin_ns, end_ns)
         stamp_ns, crank = kept["stamp_ns"], kept["crank_angle_rad"]
         raw = kept["encoder_rad"][:, : len(self._settings.names)]
         if len(crank) >= _LEAST_PHASES:
@@ -390,10 +323,10 @@ class EncoderObserver(KeepsSamples):
         deviation[:, absent], counts[:, absent] = np.nan, 0.0
         if any(present):
             settings = self._settings
-            self._clearance_regression.most = (
-                settings.commissioning_cycles if self.commissions else settings.window_cycles
+            self._regression.most = (
+                settings.window_cycles if state.errors.known else settings.commissioning_cycles
             )
-            self._clearance_regression.add_binned(deviation, counts)
+            self._regression.add_binned(deviation, counts)
             state.since_reference += 1
 
     def _accept_change(self, present: tuple[bool, ...]) -> bool:
@@ -408,7 +341,7 @@ class EncoderObserver(KeepsSamples):
             return False
         state.present, state.changed_present, state.changed_cycles = present, (), 0
         state.found = None
-        self._clearance_regression.forget()
+        self._regression.forget()
         self._evaluate_again()
         return True
 
@@ -426,18 +359,20 @@ class EncoderObserver(KeepsSamples):
 
     def _evaluate(self, stamp_ns: int) -> Commissioned | None:
         """Renew the estimate; during commissioning, fix the encoders' errors when there are enough cycles."""
-        state, regression = self.state, self._clearance_regression
+        state, regression = self.state, self._regression
         if regression.reference is None or not any(state.present):
             return None
-        if not self.commissions:
+        if state.errors.known:
             state.found = regression.fused()
             return None
-        found = regression.fused() if regression.cycles >= self._settings.commissioning_cycles else None
+        is_due = all(state.present) and regression.cycles >= self._settings.commissioning_cycles
+        found = regression.fused() if is_due else None
         if found is None:
             return None
-        state.errors = commissioned(state.errors, found, state.present)
+        errors = state.errors = commissioned(state.errors, found)
         self._evaluate_again()
-        return stored_errors(state.errors, self._settings, stamp_ns)
+        names = names_of(self._settings)
+        return Commissioned(stamp_ns, names, errors.centre_rad, errors.mean, errors.covariance)
 
     def _advance_reference(self, clearance_m: Floats, depth: Floats) -> None:
         """Continue the simulation of a reference, or begin a new one if required."""
@@ -445,7 +380,7 @@ class EncoderObserver(KeepsSamples):
         reference = self._reference.advance()
         if reference is not None:
             state.since_reference = 0
-            self._clearance_regression.refer(reference, self._prior(reference.clearance_m))
+            self._regression.refer(reference, self._prior(reference.clearance_m))
         if self._reference.is_busy or not any(state.present):
             return
         if not state.is_requested and state.profiles:
@@ -459,7 +394,7 @@ class EncoderObserver(KeepsSamples):
 
     def _is_reference_outdated(self) -> bool:
         """True if the estimated clearances or the crank motion have left the reference's."""
-        found, reference = self.state.found, self._clearance_regression.reference
+        found, reference = self.state.found, self._regression.reference
         if found is None or reference is None or self.state.since_reference < _LEAST_BETWEEN_REFERENCES:
             return False
         if mean_profile(self.state.profiles).departure(reference.profile) > _SPEED_DEPARTURE:
@@ -476,9 +411,9 @@ class EncoderObserver(KeepsSamples):
 
     def _evaluate_again(self) -> None:
         """Evaluate the kept cycles again, with a prior from the present errors of the encoders."""
-        reference = self._clearance_regression.reference
+        reference = self._regression.reference
         if reference is not None:
-            self._clearance_regression.refer(reference, self._prior(reference.clearance_m))
+            self._regression.refer(reference, self._prior(reference.clearance_m))
 
     def _prior(self, clearance_m: Floats) -> Estimate:
         """Prior of the regression.
@@ -487,7 +422,71 @@ class EncoderObserver(KeepsSamples):
         of a new clearance stays in all estimates. Afterwards they are practically unknown, so that the
         encoders alone decide.
         """
-        if not self.commissions:
+        if self.state.errors.known:
             return prior_with(self.state.errors, clearance_m, _UNKNOWN_SIGMA_M)
         wear_sigma_m = self._coefficient_sigma * (clearance_m - self._new_m)
         return prior_with(self.state.errors, clearance_m, np.hypot(_MODEL_M, wear_sigma_m))
+
+    @property
+    def seen(self) -> Sequence[KnownClearance | None]:
+        """Clearance of each joint estimated from encoders; None if it is not observable.
+
+        The encoders were commissioned with the modelled clearances, whose error is in each estimate.
+        """
+        return [
+            KnownClearance("encoders", one.clearance_m, math.hypot(one.sigma_m, tolerance_m))
+            if one.observation is ClearanceObservation.SEEN
+            else None
+            for one, tolerance_m in zip(self.estimates or (), self._leg.tolerance_m, strict=False)
+        ]
+
+    @property
+    def shows(self) -> str:
+        """Source of the estimated clearances."""
+        return "encoders"
+
+    @property
+    def notes(self) -> Mapping[str, Sequence[str]]:
+        """Encoders that give nothing that can be used."""
+        return {"ENCODER": faults(self._leg.config.encoders.names, self.state)}
+
+    @property
+    def statuses(self) -> Sequence[Status]:
+        """Further encoders: their faults, their errors, and the clearances estimated from them."""
+        names, state = self._leg.config.encoders.names, self.state
+        kinds = {spec.kind for spec in alarm_specs.ENCODERS}
+        departures = [alarm for alarm in self._board.alarms.values() if alarm.kind in kinds]
+        level, code = max(alarm.level for alarm in departures), worst_code(departures)
+        values = {"cycles": float(self._regression.cycles)}
+        for i, name in enumerate(names):
+            if state.errors.known:  # mean: offset of the crank's encoder, then offsets, then scale errors
+                values[f"{name}_offset_rad"] = float(state.errors.centre_rad[i] + state.errors.mean[1 + i])
+                values[f"{name}_scale_error"] = float(state.errors.mean[1 + len(names) + i])
+        for joint, one in zip(self._leg.clearance_joints, self.estimates or (), strict=False):
+            values[f"{joint}_estimated_m"] = one.clearance_m
+            values[f"{joint}_sigma_m"] = one.sigma_m
+            values[f"{joint}_departure_m"] = one.departure_m
+        wrong = faults(names, state)
+        if state.is_requested and not self._reference.is_busy and self._regression.reference is None:
+            wrong.append("no reference: the leg could not be simulated with its clearances")
+        if wrong and level is Level.OK:
+            level, code = Level.WARN, ENCODERS
+        return (Status("encoders", level, "; ".join([*wrong, *self._words()]), values, code),)
+
+    def _words(self) -> list[str]:
+        """Joints that differ from the model, or the reason why there is no estimate."""
+        if not self.estimates:
+            return ["no whole gait cycle yet"]
+        each = list(zip(self._leg.clearance_joints, self.estimates, strict=True))
+        words = [
+            f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than modelled"
+            for joint, one in each
+            if one.is_other
+        ]
+        states = {one.observation for _, one in each}
+        waiting = states & {ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING}
+        if not words and not waiting and ClearanceObservation.SEEN in states:
+            words = ["clearances agree with the modelled ones"]
+        hidden = ClearanceObservation.NOT_OBSERVABLE
+        words += [f"{joint} {hidden.value}" for joint, one in each if one.observation is hidden]
+        return words + sorted(one.value for one in waiting)

@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.alarms import (
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_zero import CrankZero
-from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
+from leg_wear_monitor.monitor.encoders import EncoderWatch
 from leg_wear_monitor.monitor.evaluation import A_CYCLE, AlarmEvaluation, EvaluationPeriods
 from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast

@@ -154,7 +154,7 @@ def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(mode
 
 def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, reference):
     new = watched(model, shape, reference, prior_with(UNKNOWN, FRESH, 5e-6), FRESH, noise=1e-4).fused()
-    before = prior_with(commissioned(UNKNOWN, new, (True,) * 3), FRESH, 1e-4)
+    before = prior_with(commissioned(UNKNOWN, new), FRESH, 1e-4)
     for k in range(5):
         worn = [4.5e-4 if j == k else 3e-4 for j in range(5)]
         assert others(watched(model, shape, reference, before, worn, noise=1e-4).fused()) == [k]

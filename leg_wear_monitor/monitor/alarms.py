@@ -427,7 +427,9 @@ def amount(value: float, unit: str) -> str:
     """A value [SI] with its unit, such as ``0.62 mm``; a fraction has none."""
     factor, shown = _SHOWN.get(unit, (1.0, unit))
     if unit == "s" and abs(value) >= 1.0:
-        factor, shown = 1.0, unit
+        units = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
+        size, shown = next(((one, name) for one, name in units if abs(value) >= 2.0 * one), (1.0, unit))
+        factor = 1.0 / size
     return f"{_digits(factor * value)} {shown}".rstrip()
 
 

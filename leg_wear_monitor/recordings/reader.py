@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.monitor.alarms import amount, time_words
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import bag
 from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
@@ -182,8 +183,11 @@ class Block:
         )
 
 
+_LONG_NS = 10 * 10**9  # a gap inside a recording that is reported as a pause
+
+
 class Pauses:
-    """Splits blocks where one recording has ended and the next one begins later.
+    """Splits blocks where one recording has ended and the next one begins later; reports pauses inside.
 
     Parameters
     ----------
@@ -197,6 +201,8 @@ class Pauses:
     Attributes
     ----------
     findings : list of Finding
+    total_ns : int
+        Total duration of the pauses so far, between and inside recordings.
     """
 
     def __init__(self, files: Sequence[Path], recordings: Sequence[int], shortest_ns: int) -> None:
@@ -205,6 +211,7 @@ class Pauses:
         self._known: set[int] = set()
         self._last_ns = 0
         self.findings: list[Finding] = []
+        self.total_ns = 0
 
     def cut(self, block: Block) -> Iterator[Block]:
         """Split a block at its pauses."""
@@ -218,6 +225,8 @@ class Pauses:
                     yield block.part(slice(begin, at), pause_ns)
                 begin, pause_ns = at, int(times[at + 1] - times[at])
                 self._report(block.source[at], pause_ns)
+            elif self._known and times[at + 1] - times[at] > _LONG_NS:
+                self._report_inside(block.source[at], int(times[at]), int(times[at + 1]))
         self._known.update(self._recordings[block.source].tolist())
         self._last_ns = int(times[-1])
         if begin < len(block.samples):
@@ -228,6 +237,16 @@ class Pauses:
             f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
             "monitored during this pause, which is not a fault of the input"
         )
+        self.total_ns += pause_ns
+        self.findings.append(Finding(self._files[source], text, Severity.NOTE))
+
+    def _report_inside(self, source: int, from_ns: int, to_ns: int) -> None:
+        """Report a pause, or a clock that was set: the times do not tell which."""
+        text = (
+            f"has no samples for {amount(1.0e-9 * (to_ns - from_ns), 's')} after {time_words(from_ns)}: "
+            "the recording paused, or the clock was set; cadence and speed leave this time out"
+        )
+        self.total_ns += to_ns - from_ns
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
 
 
@@ -361,6 +380,11 @@ class Recording:
         """Findings so far; complete after all blocks have been read."""
         found = [each for source in self._sources for each in source.file.findings]
         return self._findings + found + self._pauses.findings
+
+    @property
+    def paused_s(self) -> float:
+        """Total duration of the pauses so far [s]."""
+        return 1.0e-9 * self._pauses.total_ns
 
     @property
     def is_partial(self) -> bool:

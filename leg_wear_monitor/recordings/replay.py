@@ -160,7 +160,9 @@ def _run(
     first_ns: int | None = None
     for block in recording.blocks():
         first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
-        result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
+        result.paused_s = recording.paused_s
+        logged_s = (int(block.log_time_ns[-1]) - first_ns) / 1e9 - result.paused_s
+        result.logged_s = max(result.logged_s, logged_s)
         if block.pause_ns:
             monitor.pause(_stamps_apart_s(result, block))
         for samples in _evaluation_periods(block, monitor.config):

@@ -201,7 +201,9 @@ class ReplayResult:
     begin_ns, end_ns : int
         First and last stamp of valid samples [ns]; 0 if there are none.
     logged_s : float
-        Time between the first and the last message [s].
+        Time between the first and the last message, without pauses [s].
+    paused_s : float
+        Total duration of the pauses [s].
     """
 
     monitor: WearMonitor
@@ -217,6 +219,7 @@ class ReplayResult:
     begin_ns: int = 0
     end_ns: int = 0
     logged_s: float = 0.0
+    paused_s: float = 0.0
 
     @property
     def is_believable(self) -> bool:
@@ -231,8 +234,8 @@ class ReplayResult:
 
     @property
     def duration_s(self) -> float:
-        """Time between the first and the last stamp [s]; if stamps jump, time of arrival instead."""
-        stamped_s = (self.end_ns - self.begin_ns) / 1e9
+        """Time from the first to the last stamp, without pauses [s]; if stamps jump, time of arrival."""
+        stamped_s = (self.end_ns - self.begin_ns) / 1e9 - self.paused_s
         jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
         return self.logged_s if jumps else stamped_s
 

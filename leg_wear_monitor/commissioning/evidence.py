@@ -173,6 +173,8 @@ def sampling_of(one: Fit, model: TorqueModel) -> tuple[str, str]:
         f"errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times as much as independent "
         f"ones (averages: up to {_AVERAGES_TO:g}, instants: from {_INSTANTS_FROM:g} on)"
     )
+    if math.isnan(added):
+        return "", "the recording has too few samples for averages and instants to differ"
     if 0.0 < high < _AVERAGES_TO:
         return AVERAGE, why
     return (INSTANT if low > _INSTANTS_FROM and high < _INSTANTS_TO else ""), why

@@ -265,6 +265,8 @@ class Stretch:
         Stamps, and crank angles that count on over turns [rad].
     torque_ns, torque : (m,) arrays
         Stamps, and drive torques on the crank [N m].
+    repeated : float
+        Fraction of the crank samples that repeat a stamp with a different angle.
     spikes : float
         Fraction of the torques that the guard left out as outliers; 0 if they are few.
     size_nm : float
@@ -276,6 +278,7 @@ class Stretch:
     angle: Floats
     torque_ns: Ints
     torque: Floats
+    repeated: float
     spikes: float
     size_nm: float
     config: MonitorConfig
@@ -285,8 +288,18 @@ class Stretch:
         """Statistics of some samples in any order."""
         cranks, torques = (within(part, 1, 2**63 - 1) for part in (of_crank(samples), of_torque(samples)))
         angle = np.unwrap(cranks["crank_angle_rad"], period=TURN)
+        every = of_crank(samples)
+        different = np.unique(every[["stamp_ns", "crank_angle_rad"]])  # of two publishers, all are equal
+        repeated = 1.0 - len(cranks) / max(1, len(different))
         return cls(
-            cranks["stamp_ns"], angle, torques["stamp_ns"], torques["torque_nm"], spikes, size_nm, config
+            crank_ns=cranks["stamp_ns"],
+            angle=angle,
+            torque_ns=torques["stamp_ns"],
+            torque=torques["torque_nm"],
+            repeated=repeated,
+            spikes=spikes,
+            size_nm=size_nm,
+            config=config,
         )
 
     @property
@@ -320,6 +333,7 @@ def of_torque(samples: Samples) -> Samples:
 _LEAST = 20  # samples of a stretch: fewer say nothing of its stamps and its values
 _MOVING_RAD, _STILL_RAD = 0.5, 1.0e-3  # turned in a stretch: the crank turns, it stands
 _SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # scatter of stamps: over the period, and times the crank's speed
+_COARSE = 0.2  # fraction of crank samples that repeat a stamp, by a coarse clock
 _HELD, _HELD_RAD = 2.5, 0.05  # samples that repeat a value, and the angle that the crank turns meanwhile
 _NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, of the predicted RMS
 _FROZEN = 0.2  # fraction of a gait cycle in which a torque that freezes has the same value
@@ -357,6 +371,9 @@ def _stamps(one: Stretch) -> Words | None:
     Stamps of the measurement may be irregular: the angle is then smooth over them. Stamps of the arrival do
     not belong to the angles, which are smooth from sample to sample.
     """
+    if one.repeated > _COARSE:  # the stamps of several samples are rounded to one
+        scatter_s, percent = one.period_s / math.sqrt(12.0), 100.0 / math.sqrt(12.0) / (1.0 - one.repeated)
+        return {"size": amount(scatter_s, "s"), "percent": f"{percent:.0f}"}
     steps = np.diff(one.crank_ns) * 1.0e-9
     if np.mean(np.abs(steps / one.period_s - 1.0)) < _SCATTERED:
         return None

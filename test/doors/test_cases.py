@@ -83,6 +83,14 @@ def arrival(ms: float) -> Callable[[Walk], Walk]:
     return lambda walk: attrs.evolve(walk, crank_ns=late(walk.crank_ns), torque_ns=late(walk.torque_ns))
 
 
+def coarse(ms: int) -> Callable[[Walk], Walk]:
+    """A function that rounds the stamps down."""
+    step_ns = 1_000_000 * ms
+    return lambda walk: attrs.evolve(
+        walk, crank_ns=walk.crank_ns // step_ns * step_ns, torque_ns=walk.torque_ns // step_ns * step_ns
+    )
+
+
 def held(walk: Walk) -> Walk:
     """The crank angle changes with every tenth sample only."""
     first = np.arange(len(walk.angle)) // 10 * 10
@@ -120,6 +128,7 @@ CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     "arrival 1 ms": (arrival(1.0), "CRANK_STAMPS"),
     "arrival 2 ms": (arrival(2.0), "CRANK_STAMPS"),
     "arrival 4 ms": (arrival(4.0), "CRANK_STAMPS"),
+    "coarse clock": (coarse(10), "CRANK_STAMPS"),
     "held": (held, "CRANK_HELD"),
     "jump": (jumps, "CRANK_JUMP"),
     "turns": (angles(lambda angle: angle / TURN), "CRANK_UNIT"),
@@ -200,8 +209,10 @@ def test_spikes_that_are_many_at_times_do_not_flicker(leg: lw.Mechanism, walk: W
     assert codes.count("TORQUE_SPIKES") <= 1
 
 
-def rewritten(path: Path, change: Callable[[str, bytes], bytes]) -> Path:
-    """The recording with changed messages, in a new file."""
+def rewritten(
+    path: Path, change: Callable[[str, bytes], bytes], logged: Callable[[int], int] = lambda ns: ns
+) -> Path:
+    """The recording with changed messages, and changed log times [ns], in a new file."""
     make_reader = pytest.importorskip("mcap.reader").make_reader
     writer_of = pytest.importorskip("mcap.writer").Writer
     with BAG.open("rb") as source, path.open("wb") as file:
@@ -212,7 +223,8 @@ def rewritten(path: Path, change: Callable[[str, bytes], bytes]) -> Path:
                 number = writer.register_schema(schema.name, schema.encoding, schema.data)
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
             data = change(channel.topic, message.data)
-            writer.add_message(channels[channel.topic], message.log_time, data, message.publish_time)
+            log_ns = logged(message.log_time)
+            writer.add_message(channels[channel.topic], log_ns, data, message.publish_time)
         writer.finish()
     return path
 
@@ -244,6 +256,32 @@ def test_a_joint_that_is_named_twice_is_refused(tmp_path: Path) -> None:
     path = rewritten(tmp_path / "twice.mcap", named_twice)
     with pytest.raises(lw.LegWearError, match="joints 1 and 2 of joint_states are both named 'crank'"):
         lw.replay(path, BAG.with_suffix(".yaml"))
+
+
+WEEK_S = 7 * 86400
+
+
+@pytest.mark.parametrize("as_bag", [True, False])
+def test_a_pause_inside_a_file_is_reported_and_left_out(tmp_path: Path, walk: Walk, as_bag: bool) -> None:
+    """A week passes at half of the walk, or the clock is set: alike in a bag and in a table."""
+    half_ns = int(np.median(walk.crank_ns))
+
+    def later(topic: str, data: bytes) -> bytes:
+        second = int.from_bytes(data[4:8], "little")
+        is_late = 10**9 * second + int.from_bytes(data[8:12], "little") > half_ns
+        return data[:4] + (second + is_late * WEEK_S).to_bytes(4, "little") + data[8:]
+
+    if as_bag:
+        path = rewritten(tmp_path / "paused.mcap", later, lambda ns: ns + (ns > half_ns) * WEEK_S * 10**9)
+        summary = lw.replay(path, BAG.with_suffix(".yaml")).summary()
+    else:
+        time_s = 1.0e-9 * walk.crank_ns + (walk.crank_ns > half_ns) * WEEK_S
+        torque = np.interp(walk.crank_ns, walk.torque_ns, walk.torque)
+        table = {"time": time_s, "crank_angle": walk.angle, "drive_torque": torque}
+        summary = lw.replay(table).summary()
+    assert summary.recording.duration_s == pytest.approx(1.0e-9 * np.ptp(walk.crank_ns), abs=0.1)
+    texts = [one.text for one in summary.recording.findings]
+    assert any("has no samples for 7 days" in text for text in texts), texts
 
 
 SIGNALS = {

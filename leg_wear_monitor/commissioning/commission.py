@@ -34,6 +34,7 @@ from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_pr
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, newest, of_crank, within
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
+_SPIKE = 10.0  # size of a spike, over the size that nine of ten torques do not exceed
 _LEAST_SWING, _LEAST_TORQUE = 1.0e-6, 1.0e-9  # swing of a changing torque: over its size, and in its unit
 
 
@@ -93,11 +94,10 @@ def commission(
     mechanism = fitted(load_mechanism(base.mechanism), base)
     model = torque_model(mechanism)
     found = _found(signals, base, crank_joint, model)
-    progress(0.6)
     result = attrs.evolve(_result(found, mechanism), faults=tuple(faults))
     if result.config is None:
         return result
-    joint, torque = found.best.joint.topic, found.best.torque
+    joint, torque = found.choice.best.joint.topic, found.choice.best.torque
     topics = joint_states or joint, drive_torque or (None if torque.source == EFFORT else torque.topic)
     try:  # the last recording gives the phase, as it gives the offset
         walk = _walk(recordings[-1:], result.config, *topics)
@@ -199,13 +199,20 @@ def _torques(torques: dict[TorqueSource, Series]) -> dict[TorqueSource, Series]:
         )
     varying = {
         name: each
-        for name, each in torques.items()
+        for name, each in ((name, _without_spikes(each)) for name, each in torques.items())
         if np.ptp(each.value) > max(_LEAST_TORQUE, _LEAST_SWING * np.abs(each.value).max())
     }
     if not varying:
         constant = ", ".join(name.label for name in torques)
         raise LegWearError(f"no torque changes while the leg walks: {constant}")
     return varying
+
+
+def _without_spikes(torque: Series) -> Series:
+    """Torques that are not far beyond most of the others."""
+    size = np.abs(torque.value)
+    near = size <= _SPIKE * np.quantile(size, 0.9)
+    return Series(torque.time_s[near], torque.value[near], torque.recording[near])
 
 
 # The recording as the monitor sees it with the proposed parameters: its faults, and its torque residual.

@@ -164,17 +164,16 @@ def sampling_of(one: Fit, model: TorqueModel) -> tuple[str, str]:
     rest, noise = _rest(one, model), sensor_noise(one)
     size, steps = float(rest.var()) - noise**2, 0.5 * float(np.mean(np.diff(rest) ** 2)) - noise**2
     is_large = float(rest.std()) >= _LARGE * float(one.measured.std())
-    if not (is_large and size > _HIDDEN * float(rest.var()) and steps > _ROUGH * size):
-        return "", "averages and instants differ by impacts, and no strong impacts show above the noise"
     turn = TURN / max(float(np.median(np.abs(one.crank()[1]))), 1.0e-9) / one.pair.interval_s
     added, error = added_up(rest, noise, max(2, round(_WINDOW * turn)))
+    is_rough = size > _HIDDEN * float(rest.var()) and steps > _ROUGH * size
+    if not (is_large and is_rough and math.isfinite(added)):
+        return "", "averages and instants differ by impacts, and no strong impacts show above the noise"
     low, high = added - _SURE_SAMPLING * error, added + _SURE_SAMPLING * error
     why = (
         f"errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times as much as independent "
         f"ones (averages: up to {_AVERAGES_TO:g}, instants: from {_INSTANTS_FROM:g} on)"
     )
-    if math.isnan(added):
-        return "", "the recording has too few samples for averages and instants to differ"
     if 0.0 < high < _AVERAGES_TO:
         return AVERAGE, why
     return (INSTANT if low > _INSTANTS_FROM and high < _INSTANTS_TO else ""), why

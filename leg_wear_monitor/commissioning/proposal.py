@@ -17,7 +17,7 @@ from leg_wear_monitor.commissioning.evidence import (
     with_load,
 )
 from leg_wear_monitor.commissioning.result import CommissioningItem as Item
-from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate, Choice
+from leg_wear_monitor.commissioning.search import SAME_GEAR, Choice
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import JointMotion, with_repeating_acceleration
 from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
@@ -75,11 +75,6 @@ class Found:
             return self.choice.doubts
         sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit this leg, with any choice"
         return (*self.choice.doubts, sentence)
-
-    @property
-    def best(self) -> Candidate:
-        """The chosen joint and torque."""
-        return self.choice.best
 
     def friction(self, name: str) -> tuple[float, float]:
         """Friction on the crank and its standard deviation: constant [N m], or relative to the torque."""
@@ -210,7 +205,7 @@ def _chosen(found: Found, name: str, **own: Any) -> Item:
 
 def _crank(found: Found) -> Iterator[Item]:
     one, (ratio, is_exact) = found.fit, gear(found)
-    joint = found.best.joint
+    joint = found.choice.best.joint
     yield _chosen(found, "crank_joint", value=joint.joint, remark=f"in {joint.topic}")
     yield _chosen(found, "crank.sign", value=one.direction)
     yield _chosen(
@@ -232,7 +227,7 @@ def _crank(found: Found) -> Iterator[Item]:
 
 
 def _torque(found: Found) -> Iterator[Item]:
-    one, torque = found.fit, found.best.torque
+    one, torque = found.fit, found.choice.best.torque
     yield _chosen(found, "drive_torque.source", value=torque.source, remark=torque.label)
     if torque.source == WRENCH:
         yield Item(name="drive_torque.axis", value=torque.component)
@@ -302,7 +297,6 @@ _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating residual that may shift the scale more than twice as much as clearances
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque
 _NOTABLE_REST = 0.2
-_AT_ZERO_RAD = 0.02
 _DRIVES = 0.02  # a constant torque that drives the crank, as a fraction of the torque's size
 
 
@@ -392,15 +386,13 @@ def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
 
 def notes(found: Found) -> Iterator[str]:
     """Further information for the operator."""
-    joint, torque = found.best.joint, found.best.torque
+    joint, torque = found.choice.best.joint, found.choice.best.torque
     yield from found.choice.also
     ratio = gear(found)[0]
     if ratio != 1.0 and len(found.fit.offset_rad) == 1:
-        is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
-        seems = "its first reading is 0" if is_zero else "motor encoders often start at zero"
         yield (
-            f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each boot "
-            f"({seems}), the offset is valid until the next boot: set crank.zero to at_start"
+            f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each "
+            "boot, the offset is valid until the next boot: set crank.zero to at_start"
         )
     for topic, name in ((joint.topic, "joint_states"), (torque.topic, "drive_torque")):
         if topic != f"/{name}" and not (name == "drive_torque" and topic == joint.topic):

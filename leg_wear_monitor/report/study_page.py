@@ -55,7 +55,7 @@ _AXES = {
 }
 _FORCES = {
     "peak_force_n": ("largest force in a cycle [N]", 1.0),
-    "p99_force_n": ("force, 99 % of the time below [N]", 1.0),
+    "p99_force_n": ("99th percentile of the force [N]", 1.0),
     "mean_force_n": ("mean force [N]", 1.0),
     "impacts": ("impacts per cycle", 1.0),
     "impact_speed_mps": ("mean approach speed [mm/s]", 1.0e3),
@@ -230,7 +230,7 @@ def _force_table(found: Found) -> Table:
     ]
     note = (
         "Mean and standard deviation: largest forces and impacts over the cycles of all runs, the rest over "
-        "runs. A single largest force is a sample of a heavy tail; compare the 99 %. A periodic force "
+        "runs. A single largest force is a sample of a heavy tail; compare the percentile. A periodic force "
         "repeats to 100 %."
     )
     head = ["joint", *(title for title, _ in _FORCES.values())]

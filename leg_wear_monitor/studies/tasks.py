@@ -265,6 +265,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
         peaks.append(statistics.peak.copy())
         impacts.append(statistics.impacts.copy())
         statistics.response[:], statistics.peak[:] = 0.0, 0.0
+    statistics.peak[:] = np.max(peaks, axis=0)  # of the whole run, which bounds its percentiles
     found = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
     member = {f"error_{name}": np.array(largest)[:, i] for i, name in enumerate(ERRORS)}
     member |= {name: _known(found.values(), name) for name in _FIGURES}

@@ -116,6 +116,11 @@ def test_a_fine_curve_reaches_the_largest_torque():
     assert 0.99 < max(errors) / statistics.response[TORQUE_ERROR] < 1.001
 
 
+def test_a_percentile_of_a_force_lies_between_its_mean_and_its_peak(response):
+    p99 = response["p99_force_n"]
+    assert (p99 > response["mean_force_n"]).all() and (p99 <= response["peak_force_n"].max(axis=1)).all()
+
+
 def test_toe_moves_as_its_deviations_say(response):
     """Velocity is the derivative of the displacement, up to what an impact changes between two samples."""
     step = 1.0 / SAMPLES

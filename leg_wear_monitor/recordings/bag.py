@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -277,11 +277,11 @@ class Source:
 
     def pieces(self) -> Iterator[Due]:
         """Pieces of the selected channels, in order of log time."""
-        for due in self.file.pieces(self.types):
-            yield attrs.evolve(due, load=partial(self._loaded, due))
+        for start_ns, load in self.file.pieces(self.types):
+            yield start_ns, partial(self._loaded, load)
 
-    def _loaded(self, due: Due) -> Piece | None:
-        piece = due.load()
+    def _loaded(self, load: Callable[[], Piece | None]) -> Piece | None:
+        piece = load()
         if piece is not None and len(piece.messages):
             begin = piece.messages["begin"][0]
             if piece.data[begin : begin + len(_ZSTD_MAGIC)].tobytes() == _ZSTD_MAGIC:

@@ -103,4 +103,4 @@ class DatabaseFile:
         messages["begin"][1:] = messages["end"][:-1]
         data = np.frombuffer(b"".join(row[2] for row in rows), np.uint8)
         piece = Piece(rows[0][0], data, messages, self.size * len(rows) // max(expected, 1))
-        return Due(piece.start_ns, lambda: piece)
+        return piece.start_ns, lambda: piece

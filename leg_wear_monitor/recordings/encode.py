@@ -196,14 +196,6 @@ def float64s(values: ArrayLike) -> NDArray[np.uint8]:
     return layout.messages(len(numbers))
 
 
-def bools(values: ArrayLike) -> NDArray[np.uint8]:
-    """Messages of std_msgs/Bool, from values (n,): a message a row."""
-    truths = np.atleast_1d(np.asarray(values, np.uint8))
-    layout = Layout()
-    layout.column(truths[:, None])
-    return layout.messages(len(truths))
-
-
 def string(text: str) -> bytes:
     """One message of std_msgs/String."""
     layout = Layout()

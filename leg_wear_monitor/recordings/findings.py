@@ -178,17 +178,9 @@ class Piece:
     samples: Samples | None = None
 
 
-@attrs.frozen(eq=False)
-class Due:
-    """A piece that is not loaded yet, so that a merge of many files has few pieces in memory.
+Due = tuple[int, Callable[[], Piece | None]]
+"""A piece that is not loaded yet, so that a merge of many files has few pieces in memory.
 
-    Attributes
-    ----------
-    start_ns : int
-        `Piece.start_ns` of the piece [ns].
-    load : callable
-        Returns the piece, or None if it is damaged. Call it before requesting the next piece.
-    """
-
-    start_ns: int
-    load: Callable[[], Piece | None]
+Its `start_ns` [ns], and a function that returns it, or None if it is damaged; to be called before the next
+piece is requested.
+"""

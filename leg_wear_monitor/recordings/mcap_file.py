@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import IO, Any
 
 import attrs
-import lz4.frame
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -133,7 +132,7 @@ class McapFile:
         codes = np.zeros(2**16, np.int64)
         codes[list(types)] = list(types.values())
         for segment in self._segments:
-            yield Due(segment.start_ns, partial(self._piece, segment, codes))
+            yield segment.start_ns, partial(self._piece, segment, codes)
         expected = self._read if self._counts is None else sum(self._counts.get(one, 0) for one in types)
         if expected != self._read:
             self._find(f"{self._read} messages could be read of the {expected} that it counts")
@@ -221,8 +220,7 @@ class McapFile:
     def _expanded(self, chunk: Chunk) -> bytes:
         """Records of a chunk; its size and checksum must be right."""
         try:
-            size = _declared(chunk)
-            check_size(len(chunk.data) + max(size, chunk.uncompressed_size))
+            check_size(len(chunk.data) + chunk.uncompressed_size)
             stream, length = get_chunk_data_stream(chunk, validate_crc=True)
             if length != chunk.uncompressed_size:
                 raise DamageError(f"contains {length} bytes. Expected {chunk.uncompressed_size}")
@@ -274,15 +272,6 @@ def _heads(data: NDArray[np.uint8], begins: _Places) -> NDArray[np.void]:
     """Channels and times of messages, by their offsets."""
     raw = data[begins[:, None] + np.arange(_HEAD.itemsize)]
     return np.asarray(np.ascontiguousarray(raw).view(_HEAD).reshape(-1))
-
-
-def _declared(chunk: Chunk) -> int:
-    """Bytes that the compressed content of a chunk declares; 0 if it does not say."""
-    if chunk.compression == "zstd":
-        return max(0, int(zstandard.frame_content_size(chunk.data)))
-    if chunk.compression == "lz4":
-        return int(lz4.frame.get_frame_info(chunk.data)["content_size"])
-    return 0
 
 
 # Writing, with the mcap library, of files of the ros2 profile.

@@ -30,7 +30,6 @@ from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
     MISSING_JOINT,
     NO_FAULT,
-    NOT_FINITE,
     ZERO_STAMP,
     Samples,
 )
@@ -73,23 +72,8 @@ def check_topics(
     return findings
 
 
-_MOST = 1000
-_NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
-
-
-@attrs.define
-class _Missing:
-    """Messages of a file without the crank, their joints, and a report on the first without an interface."""
-
-    count: int = 0
-    names: set[str] = attrs.Factory(set)
-    twice: str = ""
-    without_interface: int = 0
-    interfaces: str = ""
-
-
 class JointNames:
-    """Searches the messages for the crank joint and its interfaces.
+    """Searches the messages of a recording for the crank joint and its interfaces.
 
     Parameters
     ----------
@@ -100,28 +84,27 @@ class JointNames:
 
     def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
         self._crank, self._interfaces = crank_joint, interfaces
-        self._found = 0
-        self._files: dict[Path, _Missing] = {}
+        self._found, self._missing, self._without = 0, 0, 0
+        self._names: set[str] = set()
+        self._twice, self._absent = "", ""
 
-    def add_samples(
-        self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples
-    ) -> None:
-        """Count messages of a file, using the samples decoded from them."""
-        file = self._files.setdefault(path, _Missing())
+    def add_samples(self, piece: Piece, samples: Samples) -> None:
+        """Count messages, using the samples decoded from them."""
+        messages = piece.messages
         cranks = messages["type"] == JOINT_STATE
-        self._found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        self._found += int(np.count_nonzero(cranks & (samples["fault"] != MISSING_JOINT)))
         missing = messages[cranks & (samples["fault"] == MISSING_JOINT)]
-        file.count += len(missing)
-        if len(missing) and len(file.names) < _MOST:
-            names = names_in(_raw(data, missing[0]))[:_MOST]
-            file.names |= set(names)
-            file.twice = file.twice or twice(names, self._crank)
+        self._missing += len(missing)
+        if len(missing):
+            names = names_in(_raw(piece, missing[0]))
+            self._names |= set(names)
+            self._twice = self._twice or twice(names, self._crank)
         without = messages[(messages["type"] == INTERFACES) & is_without(samples, self._interfaces)]
-        file.without_interface += len(without)
-        if len(without) and not file.interfaces:
-            file.interfaces = without_interface(_raw(data, without[0]), self._crank, self._interfaces)
+        self._without += len(without)
+        if len(without) and not self._absent:
+            self._absent = without_interface(_raw(piece, without[0]), self._crank, self._interfaces)
 
-    def findings(self) -> list[Finding]:
+    def findings(self, path: Path) -> list[Finding]:
         """Findings after all messages have been read.
 
         Raises
@@ -130,25 +113,24 @@ class JointNames:
             If messages contain joints but never the crank.
         """
         findings = []
-        for path, file in self._files.items():
-            if file.interfaces:
-                text = f"{file.without_interface} messages of dynamic_joint_states: {file.interfaces}"
-                findings.append(Finding(path, text))
-            if file.twice:
-                raise RecordingError(str(path), self._crank, file.twice)
-            if file.count:
-                names = listed(sorted(file.names))
-                text = f"is not among the joints of {file.count} messages; they have {names}"
-                if not self._found:
-                    remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
-                    raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
-                text = f"joint {self._crank} {text}; {self._found} messages have it"
-                findings.append(Finding(path, text, Severity.NOTE))
+        if self._absent:
+            text = f"{self._without} messages of dynamic_joint_states: {self._absent}"
+            findings.append(Finding(path, text))
+        if self._twice:
+            raise RecordingError(str(path), self._crank, self._twice)
+        if self._missing:
+            text = f"is not among the joints of {self._missing} messages; they have"
+            text = f"{text} {listed(sorted(self._names))}"
+            if not self._found:
+                remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
+                raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
+            text = f"joint {self._crank} {text}; {self._found} messages have it"
+            findings.append(Finding(path, text, Severity.NOTE))
         return findings
 
 
-def _raw(data: NDArray[np.uint8], message: np.void) -> bytes:
-    return data[message["begin"] : message["end"]].tobytes()
+def _raw(piece: Piece, message: np.void) -> bytes:
+    return piece.data[message["begin"] : message["end"]].tobytes()
 
 
 # Pauses between recordings that are replayed together: time without recording, not an input fault.
@@ -250,53 +232,38 @@ class Pauses:
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
 
 
-# Check that the clocks of a recording agree: header stamps against log times.
+# Check that a torque without header, which has log times, fits the header stamps of the crank.
 
 
-_FRACTION, _LEAST_NS = 0.05, 1_000_000_000
+_FAR_NS = 1_000_000_000
 
 
 class Clocks:
-    """First and last stamps and log times of each message type."""
+    """Streams with messages, and how far the crank's header stamps are from its log times."""
 
     def __init__(self) -> None:
-        self._ends: dict[int, NDArray[np.int64]] = {}
+        self._seen: set[int] = set()
+        self._apart_ns: int | None = None
 
     def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
-        """Update the times from messages and the samples decoded from them.
-
-        Parameters
-        ----------
-        samples : (n,) array of GAIT_SAMPLE
-            Stamped by their headers.
-        messages : (n,) array of MESSAGE
-        """
+        """Update from messages and the samples decoded from them, stamped by their headers."""
         good = samples["fault"] == NO_FAULT
-        for code in np.unique(messages["type"][good]).tolist():
-            chosen = good & (messages["type"] == code)
-            ends = np.stack([samples["stamp_ns"][chosen], messages["log_time_ns"][chosen]])[:, [0, -1]]
-            ends[:, 0] = self._ends.get(code, ends)[:, 0]
-            self._ends[code] = ends
+        self._seen |= set(np.unique(messages["type"][good]).tolist())
+        cranks = np.flatnonzero(good & (messages["type"] == JOINT_STATE))
+        if self._apart_ns is None and len(cranks):
+            k = cranks[0]
+            self._apart_ns = int(messages["log_time_ns"][k]) - int(samples["stamp_ns"][k])
 
     def notes(self) -> list[str]:
         """Disagreements of the clocks, one line each."""
-        found = []
-        crank = self._ends.get(JOINT_STATE)
-        for stream in (stream for stream in STREAMS if stream.code in self._ends):
-            span, span_log = np.diff(self._ends[stream.code])[:, 0].tolist()
-            if stream.has_stamp and abs(span - span_log) > max(_LEAST_NS, _FRACTION * abs(span_log)):
-                found.append(
-                    f"{stream.topic}: header stamps span {span / 1e9:.6g} s, log times "
-                    f"{span_log / 1e9:.6g} s; header stamps are used, unless --time selects others"
-                )
-            if not stream.has_stamp and crank is not None:
-                apart = int(crank[1, 1] - crank[0, 1])
-                if abs(apart) > _LEAST_NS:
-                    found.append(
-                        f"{stream.topic} has no header, so its stamps are log times; they are "
-                        f"{apart / 1e9:.6g} s after the header stamps of joint_states; try --time log"
-                    )
-        return found
+        if self._apart_ns is None or abs(self._apart_ns) <= _FAR_NS:
+            return []
+        return [
+            f"{stream.topic} has no header, so its stamps are log times; they are "
+            f"{self._apart_ns / 1e9:.6g} s after the header stamps of joint_states; try --time log"
+            for stream in STREAMS
+            if stream.code in self._seen and not stream.has_stamp
+        ]
 
 
 TIMES = ("header", "log", "publish")
@@ -402,7 +369,7 @@ class Recording:
         with reading(self.files):
             for block in self._joined():
                 yield from self._pauses.cut(block)
-        self._findings += self._joints.findings()
+        self._findings += self._joints.findings(self.files[0])
         notes, other_axis = self._clocks.notes(), self._axis.report()
         self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
         self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
@@ -431,8 +398,8 @@ class Recording:
         dues = (
             zip(repeat(number), source.pieces(), strict=False) for number, source in enumerate(self._sources)
         )
-        for number, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
-            piece = due.load()
+        for number, (_, load) in heapq.merge(*dues, key=lambda each: each[1][0]):
+            piece = load()
             if piece is not None:
                 yield number, piece
 
@@ -441,14 +408,14 @@ class Recording:
         if piece.samples is not None:  # a table has one clock only
             return self._decoder.scaled(piece.samples)
         samples = self._decoder.many(piece.data, piece.messages)
-        self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
+        self._joints.add_samples(piece, samples)
         wrenches = np.flatnonzero(
             (piece.messages["type"] == WRENCH_STAMPED)
             & (samples["kind"] == TORQUE)
             & (samples["fault"] == NO_FAULT)
         )
         some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
-        self._axis.add(piece.data[one["begin"] : one["end"]].tobytes() for one in some)
+        self._axis.add(_raw(piece, one) for one in some)
         self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT

@@ -3,7 +3,6 @@
 `commissioning` then finds out which joint is the crank, and which torque drives it.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from typing import Any
@@ -89,7 +88,6 @@ _PUBLISHED = tuple(each.name.lstrip("~") for each in (outputs.CLEARANCES, output
 # Interfaces of a joint that are not candidates: three are not torques, and joint_states has the effort as
 # well.
 _NO_CANDIDATES = ("position", "velocity", "acceleration", "effort")
-_MOST_JOINTS = 200  # joints per topic: each joint is decoded separately, so this bounds the work
 _NAMING_MESSAGES = 20  # messages at the start of a piece to read joint names from
 _LONGEST_PAUSE_NS = 10 * 10**9
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
@@ -147,18 +145,14 @@ def read_signals(
         collected: dict[JointName | TorqueSource, _Parts] = {}
         read, total = 0, max(1, sum(source.file.size for source in sources))
         for source in sources:
-            for due in source.pieces():
-                piece = due.load()
+            for _, load in source.pieces():
+                piece = load()
                 if piece is not None:  # a damaged piece is a finding of its file
                     recording = source.bag_file.recording
                     _add_piece(collected, selected, piece, config, recording)
                     read += piece.stored
                     progress(min(1.0, read / total))
         findings = unreadable + skipped + [each for source in sources for each in source.file.findings]
-    numbers = Counter(name.topic for name in collected if isinstance(name, JointName) or name.interface)
-    crowded = (topic for topic, number in numbers.items() if number >= _MOST_JOINTS)
-    only = f"only the first {_MOST_JOINTS} of its joints are read"
-    findings += [Finding(bag_files[0].path, f"{topic}: {only}", Severity.NOTE) for topic in crowded]
     return _signals(collected), findings
 
 
@@ -294,24 +288,24 @@ def _decoder(source: str, axis: str = "z", joint: str = _NO_JOINT, interface: st
 
 
 def _joint_names(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[str]:
-    """Names of the joints in the first messages, at most `_MOST_JOINTS`."""
+    """Names of the joints in the first messages."""
     names: dict[str, None] = {}  # a set that keeps the order
     for raw in _first_decodable(EFFORT, data, messages):
-        known = names_in(raw)[:_MOST_JOINTS]
+        known = names_in(raw)
         again = next(filter(None, (twice(known, name) for name in known if name)), "")
         if again:
             raise LegWearError(again)
         names |= dict.fromkeys(known)
-    return [name for name in names if name][:_MOST_JOINTS]
+    return [name for name in names if name]
 
 
 def _interfaces(data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[tuple[str, str]]:
     """Joints with their interfaces that may be a torque, in the first messages."""
     pairs: dict[tuple[str, str], None] = {}
     for raw in _first_decodable(INTERFACE, data, messages):
-        for joint, names in list(interfaces_in(raw).items())[:_MOST_JOINTS]:
+        for joint, names in interfaces_in(raw).items():
             pairs |= dict.fromkeys((joint, name) for name in names if name and name not in _NO_CANDIDATES)
-    return list(pairs)[:_MOST_JOINTS]
+    return list(pairs)
 
 
 def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.void]) -> list[bytes]:

@@ -23,12 +23,10 @@ from leg_wear_monitor.recordings.findings import (
     CSV,
     PARQUET,
     Channel,
-    DamageError,
     Due,
     Finding,
     Piece,
     RecordingError,
-    check_size,
     listed,
 )
 from leg_wear_monitor.recordings.streams import streams_of
@@ -123,23 +121,12 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
 # Tables of any kind: `names` has the names of the columns, `batches` gives the rows.
 
 
-@attrs.frozen
-class Batch:
-    """Some rows as the table has them.
+Batch = tuple[_Ints, list[Any], int]
+"""Some rows as the table has them.
 
-    Attributes
-    ----------
-    line : (n,) array of int
-        Line or row in the table, from 1.
-    columns : list of pyarrow.Array
-        Texts, numbers or dates (n,) of each column that is read. A null was not measured.
-    stored : int
-        Bytes that the rows occupy in the file.
-    """
-
-    line: _Ints
-    columns: list[Any]
-    stored: int
+Lines or rows in the table (n,), from 1; texts, numbers or dates (n,) of each column that is read, where a
+null was not measured; bytes that the rows occupy in the file.
+"""
 
 
 class Table:
@@ -155,7 +142,7 @@ class Table:
     ----------
     head : Head
     size : int
-        Bytes of the table, or another number to which `Batch.stored` sums up.
+        Bytes of the table, or another number to which those of the batches sum up.
     findings : list of Finding
         Faults of the table.
 
@@ -190,7 +177,7 @@ class Table:
             raise RecordingError(str(self.path), "", f"has columns of different lengths: {words}")
         for begin in range(0, len(arrays[0]), _ROWS):
             chosen = [array[begin : begin + _ROWS] for array in arrays]
-            yield Batch(begin + 1 + np.arange(len(chosen[0])), chosen, len(chosen[0]))
+            yield begin + 1 + np.arange(len(chosen[0])), chosen, len(chosen[0])
 
     def _array(self, name: str, values: Any) -> Any:
         if len(shape := np.shape(values)) != 1:
@@ -270,7 +257,7 @@ class CsvTable(Table):
                 filled = np.any([np.asarray(column.is_valid()) for column in batch.columns], axis=0)
                 chosen = [column.filter(pa.array(filled)) for column in batch.columns]
                 at, stored = self._file.tell(), self._file.tell() - at
-                yield Batch(lines[filled], chosen, stored)
+                yield lines[filled], chosen, stored
         except pa.ArrowInvalid as error:
             self.lose(f"all from line {line} on is lost: {one_line(error)}")
 
@@ -295,7 +282,7 @@ class CsvTable(Table):
 
 
 class ParquetTable(Table):
-    """A Parquet file, one group of rows at a time."""
+    """A Parquet file."""
 
     def _open(self, content: Any) -> None:
         self.size = content.seek(0, 2)
@@ -307,21 +294,16 @@ class ParquetTable(Table):
             raise RecordingError(str(self.path), "", fault) from error
 
     def batches(self, columns: Sequence[int]) -> Iterator[Batch]:
-        """Rows of some columns; the remaining rows of a damaged group are lost."""
-        whole, end = self._file.metadata, 0
-        names = [self.head.names[k] for k in columns]
-        for group in range(whole.num_row_groups):
-            at, end = end, end + whole.row_group(group).num_rows
-            try:
-                read = (whole.row_group(group).column(k) for k in columns)
-                check_size(sum(column.total_uncompressed_size for column in read))
-                for batch in self._file.iter_batches(_ROWS, row_groups=[group], columns=names):
-                    stored = self.size * batch.num_rows // max(1, whole.num_rows)
-                    columns_read = [batch.column(name) for name in names]
-                    yield Batch(at + 1 + np.arange(batch.num_rows), columns_read, stored)
-                    at += batch.num_rows
-            except (DamageError, pa.ArrowException, OSError) as error:
-                self.lose(f"rows {at + 1} to {end} cannot be read: {one_line(error)}: they are lost")
+        """Rows of some columns."""
+        names, at = [self.head.names[k] for k in columns], 0
+        try:
+            for batch in self._file.iter_batches(_ROWS, columns=names):
+                stored = self.size * batch.num_rows // max(1, self._file.metadata.num_rows)
+                read = [batch.column(name) for name in names]
+                yield at + 1 + np.arange(batch.num_rows), read, stored
+                at += batch.num_rows
+        except (pa.ArrowException, OSError) as error:
+            self.lose(f"all from row {at + 1} on is lost: {one_line(error)}")
 
 
 def open_table(path: Path, content: IO[bytes] | Any, storage: str, wanted: str) -> Table:
@@ -375,10 +357,10 @@ class Rows:
 def _rows(table: Table, columns: Sequence[Column], config: MonitorConfig) -> Iterator[Rows]:
     """Rows that the configuration can read; lines with a faulty cell become findings."""
     places = [_place(table, column) for column in columns]
-    for batch in table.batches(places):
-        sound = np.ones(len(batch.line), bool)
-        stamps, values, measured = _regular(table, batch.line, config), {}, {}
-        for column, cells in zip(columns, batch.columns, strict=True):
+    for line, read, stored in table.batches(places):
+        sound = np.ones(len(line), bool)
+        stamps, values, measured = _regular(table, line, config), {}, {}
+        for column, cells in zip(columns, read, strict=True):
             array = _checked(table, column, cells)
             if column.key == STAMP:
                 stamps, good = _stamps(array, column.unit, config.table)
@@ -387,13 +369,13 @@ def _rows(table: Table, columns: Sequence[Column], config: MonitorConfig) -> Ite
                 factor, divisor = column.scale
                 values[column.key], measured[column.key] = found * factor / divisor, there
             for k in np.flatnonzero(sound & ~good).tolist():
-                table.lose_row(int(batch.line[k]), f"column {column.name!r}: {_fault(column, array[k])}")
+                table.lose_row(int(line[k]), f"column {column.name!r}: {_fault(column, array[k])}")
             sound &= good
         yield Rows(
             stamps[sound],
             {key: column[sound] for key, column in values.items()},
             {key: column[sound] for key, column in measured.items()},
-            batch.stored,
+            stored,
         )
     table.close()
 
@@ -574,7 +556,7 @@ class TableFile:
             return None if rows is None else self._piece(rows, types)
 
         while not is_over:
-            yield Due(self._last_ns, load)
+            yield self._last_ns, load
 
     def _piece(self, rows: Rows, types: dict[int, int]) -> Piece:
         """Samples of rows in their order; of a row, the crank's comes before the torque's and the load's."""

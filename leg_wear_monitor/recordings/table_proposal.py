@@ -92,8 +92,8 @@ def propose(path: Path) -> Proposal | None:
         names = source.head.names
         if {Columns().stamp, Columns().crank_angle, Columns().drive_torque} <= set(names):
             return None
-        first = next((rows for rows in source.batches(range(len(names))) if len(rows.line)), None)
-        rows = [column.slice(0, 200).to_pylist() for column in first.columns] if first else []
+        first = next((read for line, read, _ in source.batches(range(len(names))) if len(line)), [])
+        rows = [column.slice(0, 200).to_pylist() for column in first]
     texts = [["" if cell is None else str(cell).strip() for cell in column] for column in rows]
     texts = texts or [[] for _ in names]
     if source.head.has_decimal_comma:

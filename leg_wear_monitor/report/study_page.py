@@ -39,8 +39,6 @@ from leg_wear_monitor.studies.tables import (
     fraction_of_range,
     largest_error,
     of_joint,
-    period_of,
-    power_law,
     worst_zone,
 )
 from leg_wear_monitor.studies.tasks import ERRORS, Arrays
@@ -68,7 +66,6 @@ _WEAR = {
 }
 _CHARTS = ("peak_force_n", "p99_force_n", "mean_force_n", DEPTH, ARCHARD)
 _MOST_SHOWN = 6  # points with curves and surfaces; of more points, the first, the middle and the last
-_LONGEST, _SAME = 16, 1.0e-3  # longest period searched [cycles]; tolerance for equal points [clearances]
 _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an example. Dashed: ideal leg."
 
 
@@ -161,7 +158,7 @@ def _known(found: Found) -> list[tuple[str, str, str, float]]:
 
 
 def _error_table(found: Found) -> Table:
-    known, axis = _known(found), _axis(found)
+    known = _known(found)
     rows = [
         [point.label]
         + [with_spread(largest_error(arrays, name), factor) for name, _, _, factor in known]
@@ -171,18 +168,6 @@ def _error_table(found: Found) -> Table:
     note = (
         "Mean and standard deviation over the cycles of all runs. The range is the range of the ideal curve."
     )
-    if axis and len(found) > 3 and min(axis[1]) > 0.0:
-        laws = [
-            power_law(axis[1], [largest_error(arrays, name).mean for _, arrays in found])
-            for name, *_ in known
-        ]
-        rows.append(
-            [
-                "exponent of a power law",
-                *(f"{p:.2f} ± {error:.2f}" for p, error in laws),
-                *("" for _ in known),
-            ]
-        )
     head = [f"{title} [{unit}]" for _, title, unit, _ in known] + [
         f"{title}, fraction of its range" for _, title, *_ in known
     ]
@@ -416,13 +401,11 @@ def _sections_of_cycles(results: StudyResults) -> dict[str, Sequence[Part]]:
 
 
 def _map_table(clearance_m: float, arrays: Arrays) -> Table:
-    places, rows = arrays["section_eccentricity_m"] / clearance_m, []
+    rows = []
     for k, joint in enumerate(clearance_joints_of(arrays)):
-        scatter = float(np.sqrt(np.square(places[:, k] - places[:, k].mean(axis=0)).sum(axis=1).mean()))
-        period = period_of(places[:, k], _LONGEST, _SAME)
-        rows.append([joint, number(scatter), "none" if period is None else str(period)])
-    head = ("joint", "scatter (RMS) [clearances]", f"period, up to {_LONGEST} [cycles]")
-    return Table(caption="Scatter of the map", head=head, rows=rows)
+        places = arrays["section_eccentricity_m"][:, k] / clearance_m
+        rows.append([joint, number(float(np.sqrt(places.var(axis=0).sum())))])
+    return Table(caption="Scatter of the map", head=("joint", "scatter (RMS) [clearances]"), rows=rows)
 
 
 def _planes(clearance_m: float, arrays: Arrays, kind: str, caption: str) -> Gallery:

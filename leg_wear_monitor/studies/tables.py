@@ -1,6 +1,5 @@
 """Statistics of a study's points, and its tables."""
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -101,28 +100,6 @@ def worst_zone(arrays: Arrays, joint: str, fraction: float) -> tuple[float, floa
     return wear_zone(np.asarray(profiles.mean(axis=0)), fraction)
 
 
-def power_law(values: ArrayLike, effects: ArrayLike) -> tuple[float, float]:
-    """Exponent p of a law effect ~ value^p by least squares of the logarithms, and its standard error.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Varied quantity, such as the clearance; above 0.
-    effects : (n,) array
-        Effect of each value, such as the largest deviation; above 0.
-
-    Returns
-    -------
-    exponent, error : float
-        The error is NaN for less than four points, because their scatter says too little.
-    """
-    x, y = np.log(np.asarray(values, dtype=float)), np.log(np.asarray(effects, dtype=float))
-    if len(x) < 4:
-        return float(np.polyfit(x, y, 1)[0]), math.nan
-    slope, covariance = np.polyfit(x, y, 1, cov=True)
-    return float(slope[0]), float(np.sqrt(covariance[0, 0]))
-
-
 def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
     """Lyapunov exponent from the growth factors of independent runs, with its standard error.
 
@@ -146,29 +123,6 @@ def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
     each = rates.mean(axis=1)
     errors = each.std(ddof=1) / np.sqrt(len(each)), rates.std(ddof=1) / np.sqrt(rates.size)
     return Estimate(float(each.mean()), float(max(errors)))
-
-
-def period_of(points: Floats, longest: int, tolerance: float) -> int | None:
-    """Period of a Poincaré section.
-
-    Parameters
-    ----------
-    points : (n, m) array
-        Points of the section.
-    longest : int
-        Longest period to try.
-    tolerance : float
-        Largest difference between equal points, in the unit of the points.
-
-    Returns
-    -------
-    int or None
-        Number of points after which the section repeats; None if it does not.
-    """
-    for period in range(1, min(longest, len(points) - 1) + 1):
-        if np.abs(points[period:] - points[:-period]).max() <= tolerance:
-            return period
-    return None
 
 
 # Responses of a study's points as columns of tables; mean and deviation of a statistic after a dot.

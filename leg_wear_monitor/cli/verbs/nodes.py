@@ -86,7 +86,7 @@ def demo(out: Path) -> int:
     import_module("leg_wear_monitor.recordings.mcap_file")  # rather than in a node, once both are running
     common.check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
-    _compile(out)
+    _compile()
     live = _listen(out)
     _compare_with_truth(out, live)
     same = _replay(out)
@@ -102,24 +102,14 @@ def demo(out: Path) -> int:
     return DONE
 
 
-def _compile(out: Path) -> None:
+def _compile() -> None:
     """Compile the nodes' kernels: the monitor's kernels here, the leg's kernels in a second process."""
+    from leg_wear_monitor.dynamics.full_run import advance_full
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.workers import python_command  # numba: not for --help
+    from leg_wear_monitor.workers import compiled_beside
 
-    log_path = out / "compilation.log"
-    with (
-        log_path.open("wb") as log,
-        # its own process group, so that Ctrl-C reaches it only once, through us
-        subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
-        closed_on_interrupt(leg.kill),
-    ):
-        try:
-            common.compile_monitor(MonitorConfig())
-            leg.wait()
-        finally:
-            leg.kill()
-    _check_ended(leg, log_path)
+    with compiled_beside(compile_leg, advance_full):
+        common.compile_monitor(MonitorConfig())
 
 
 def compile_leg() -> None:
@@ -304,9 +294,8 @@ def _setup(config: Path, node: str) -> "LegSetup":
 
 def _serve(leg: "LiveLeg", place: "Place") -> None:
     """Serve until a signal."""
-    from leg_wear_monitor.dashboard.hosts import is_local
     from leg_wear_monitor.dashboard.hub import Hub
-    from leg_wear_monitor.dashboard.server import serve
+    from leg_wear_monitor.dashboard.server import is_local, serve
 
     def ready(ended: asyncio.Event) -> None:
         loop = asyncio.get_running_loop()

@@ -185,20 +185,6 @@ def check_alone(**others: object) -> None:
         raise click.UsageError(f"--node cannot be combined with {names}")
 
 
-def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
-    """Reply of a service of a running monitor, which is called at most so many times, until it succeeds.
-
-    Raises
-    ------
-    LegWearError
-        Without ROS, if no node answers, or if the last call is refused.
-    """
-    need_rclpy()
-    from leg_wear_monitor.ros.measure import trigger_on
-
-    return trigger_on(node, service, wait_s, times)
-
-
 def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
     """Command that runs a node."""
 

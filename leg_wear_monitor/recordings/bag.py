@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.findings import (
     CSV,
     PARQUET,
+    REMEDIES,
     Channel,
     DamageError,
     Due,
@@ -26,6 +27,7 @@ from leg_wear_monitor.recordings.findings import (
     listed,
     open_recording,
 )
+from leg_wear_monitor.recordings.mcap_file import McapFile
 from leg_wear_monitor.recordings.streams import Stream, streams_of
 from leg_wear_monitor.twin import TORQUE
 
@@ -38,18 +40,6 @@ _NAME = re.compile(r".*(\.mcap|\.db3)", re.DOTALL)
 _TABLE = re.compile(r".*(\.csv|\.parquet)", re.DOTALL | re.IGNORECASE)
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _EXPECTED = "a bag directory, .mcap, .db3, .csv or .parquet"
-_RENAME = "not read under this name. Rename it to {path.stem}.csv if it is a table"
-_EXPORT = "a spreadsheet. Save it as CSV (UTF-8)"
-_REMEDIES = dict.fromkeys((".txt", ".tsv", ".dat", ".log"), _RENAME)
-_REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), _EXPORT)
-_REMEDIES |= dict.fromkeys((".zstd", ".zst"), "compressed as a whole. Run: zstd -d {path} -o {path.stem}")
-_REMEDIES[".bag"] = "a ROS 1 bag. Convert it: rosbags-convert --src {path} --dst {path.stem}"
-"""Remedy for a file that is not read, by the end of its name."""
-
-
-def is_table_name(name: str) -> bool:
-    """True if a file is a table by its name, or a recording of a kind that is refused with a remedy."""
-    return Path(name).suffix.lower() in (CSV, PARQUET, *_REMEDIES)
 
 
 class DataFrame(Protocol):
@@ -144,7 +134,7 @@ def _storage(path: Path) -> str:
     """Kind of a file by its name, the lower-case end of it."""
     match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
-        remedy = _REMEDIES.get(path.suffix.lower())
+        remedy = REMEDIES.get(path.suffix.lower())
         text = remedy.format(path=path) if remedy else f"not a recognised recording. Expected {_EXPECTED}"
         raise RecordingError(str(path), "", text)
     if not path.is_file():
@@ -375,8 +365,6 @@ def _open(bag_file: BagFile, config: MonitorConfig, stack: ExitStack) -> OpenFil
             content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
             return TableFile(path, content, bag_file.storage, config)
         if bag_file.storage == MCAP:
-            from leg_wear_monitor.recordings.mcap_file import McapFile
-
             return McapFile(path, stack.enter_context(open_recording(path)))
         from leg_wear_monitor.recordings.database import DatabaseFile
 

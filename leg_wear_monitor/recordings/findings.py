@@ -113,6 +113,18 @@ def check_size(needed: int) -> None:
 
 
 CSV, PARQUET = ".csv", ".parquet"
+_RENAME = "not read under this name. Rename it to {path.stem}.csv if it is a table"
+_EXPORT = "a spreadsheet. Save it as CSV (UTF-8)"
+REMEDIES = dict.fromkeys((".txt", ".tsv", ".dat", ".log"), _RENAME)
+REMEDIES |= dict.fromkeys((".xlsx", ".xls", ".ods"), _EXPORT)
+REMEDIES |= dict.fromkeys((".zstd", ".zst"), "compressed as a whole. Run: zstd -d {path} -o {path.stem}")
+REMEDIES[".bag"] = "a ROS 1 bag. Convert it: rosbags-convert --src {path} --dst {path.stem}"
+"""Remedy for a file that is not read, by the end of its name."""
+
+
+def is_table_name(name: str) -> bool:
+    """True if a file is a table by its name, or a recording of a kind that is refused with a remedy."""
+    return Path(name).suffix.lower() in (CSV, PARQUET, *REMEDIES)
 
 
 def listed(names: Iterable[str]) -> str:

@@ -35,17 +35,6 @@ def test_a_page_of_a_shipped_mechanism(run, tmp_path):
     assert 'content="leg-wear-monitor draw"' in page
 
 
-def test_a_drawing_is_replaced_and_nothing_else_is(run, tmp_path, complaints):
-    assert run("draw", "four_bar").exit_code == 0
-    assert run("draw", "four_bar").exit_code == 0
-    for name in ("mine.html", "mine.urdf"):
-        (tmp_path / name).write_text("mine")
-        result = run("draw", "four_bar", "--out", name)
-        assert (result.exit_code, (tmp_path / name).read_text()) == (2, "mine")
-        fault = "exists and is not a drawing of this command. Expected a different --out FILE"
-        assert complaints(result) == [f"error: --out: {name}: {fault}"]
-
-
 def test_what_does_not_close_is_drawn_and_said_with_its_gap(run, long_coupler, complaints):
     out = long_coupler.with_suffix(".html")
     result = run("draw", str(long_coupler), "--out", str(out))
@@ -92,6 +81,3 @@ def test_a_robot_description_in_place_of_a_picture(run, tmp_path):
     assert run(*line).exit_code == 0
     text = (tmp_path / "slider_crank.urdf").read_text()
     assert ElementTree.fromstring(text).get("name") == "slider_crank"
-    (comment,) = re.findall("<!--(.*?)-->", text)
-    assert "--" not in comment  # which is no XML, though Python reads it
-    assert run(*line).exit_code == 0  # ours: replaced

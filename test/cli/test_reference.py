@@ -4,7 +4,6 @@ import math
 import warnings
 from pathlib import Path
 
-import attrs
 import numpy as np
 import pytest
 
@@ -97,22 +96,6 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
         read_toe_force(tmp_path / "stance.csv")
     usual = f"foot_load: {shown} at most, usually 10 to 5000 N. Is it in a different unit?"
     assert [str(each.message).split(": ", 1)[1] for each in found] == ([usual] if shown else [])
-
-
-def test_the_load_of_references_is_reported(run, tmp_path: Path) -> None:
-    leg = load_mechanism("bionic_leg")
-    (shipped,) = reference_file.shipped_references(leg)
-    few = attrs.evolve(shipped, torque_nm=tuple(torque[:1] for torque in shipped.torque_nm))
-    load = 300.0 * nominal_stance(build_linkage(leg)).force()
-    loaded = attrs.evolve(few, parameters=attrs.evolve(few.parameters, load=load))
-    with (tmp_path / "leg.npz").open("wb") as file:
-        reference_file.write_references(file, leg, [few, loaded])
-    text = ", references at 60, 60 rpm, 1 of 2 under 300 N on the foot"
-    for model, end in (("none", ", not used with load.model none\n"), ("ground", "\n")):
-        (tmp_path / "monitor.yaml").write_text(
-            f"/**: {{ros__parameters: {{load: {{model: {model}}}, diagnosis: {{reference: leg.npz}}}}}}"
-        )
-        assert text + end in run("check", "monitor.yaml").stdout
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import shutil
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from importlib import metadata
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -36,7 +35,6 @@ _FIGURES = {
     "viscous_nms": "viscous friction {:.4g} N m s/rad",
     "stiffness_nm_per_rad": "stiffness {:.4g} N m/rad",
 }
-_LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
 
 @click.command(short_help="Check a configuration or the installation.")
@@ -61,11 +59,9 @@ def check(configs: tuple[str, ...]) -> int:
 
 def _installation() -> bool:
     click.echo(f"{'version':<13} {package_version()}")
-    libraries = {name: _library(name) for name in _LIBRARIES}
-    if not _all_well({"python": platform.python_version, **libraries}):
-        return False  # the rest needs them
+    click.echo(f"{'python':<13} {platform.python_version()}")
     if not _all_well({"kernels": _kernels, "share": lambda: str(share_directory())}):
-        return False
+        return False  # the rest needs them
     from leg_wear_monitor.mechanism.loader import shipped_mechanisms
     from leg_wear_monitor.monitor.config.parameters import shipped_config
 
@@ -86,16 +82,6 @@ def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
     return well
 
 
-def _library(name: str) -> Callable[[], str]:
-    def find() -> str:
-        try:
-            return metadata.version(name)
-        except metadata.PackageNotFoundError as error:
-            raise LegWearError(f"{name}: is not installed. Expected by leg_wear_monitor") from error
-
-    return find
-
-
 def _kernels() -> str:
     from leg_wear_monitor.compiled.kernel import cache_directory, shipped_directory
 
@@ -109,7 +95,7 @@ def _kernels() -> str:
 
 
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
-    from leg_wear_monitor.recordings.bag import is_table_name
+    from leg_wear_monitor.recordings.findings import is_table_name
 
     files, parameters = {}, None
     for name in names:
@@ -191,16 +177,10 @@ def _parameters(path: str, node: str | None = None) -> str:
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
     )
     if config.diagnosis.reference:
-        from leg_wear_monitor.mechanism.person import upwards
         from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 
         known = read_references(Path(config.diagnosis.reference), leg)
         text += f", references at {', '.join(f'{one.profile.cadence_rpm:.3g}' for one in known)} rpm"
-        up = upwards(leg)
-        loads = [f"{(one.parameters.load @ up).max():.3g}" for one in known if one.parameters.load.size]
-        if loads:
-            unused = ", not used with load.model none" if config.load.model == "none" else ""
-            text += f", {len(loads)} of {len(known)} under {', '.join(loads)} N on the foot{unused}"
     return text + _drive(config.drive, path)
 
 

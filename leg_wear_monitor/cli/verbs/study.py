@@ -99,7 +99,6 @@ def write_study_page(path: Path) -> int:
 
 
 _URDF = ".urdf"
-_OURS = b"leg-wear-monitor draw"  # near the start of a file that this verb writes
 
 
 @click.command(short_help="Draw a mechanism, working or not.")
@@ -113,13 +112,15 @@ _OURS = b"leg-wear-monitor draw"  # near the start of a file that this verb writ
 def draw(mechanism: str, out: Path | None) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
 
-    The HTML page moves the mechanism through its cycle; it is one file and needs no network. If the mechanism
-    does not close, the page shows the open joint and its distance. If the crank does not turn through, the
-    page shows its range and the bodies in line at its ends. The exit code is then 1. Replaces a drawing of an
-    earlier run, and no other file.
+    The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
+    mechanism does not close, its bodies are drawn apart at the open joint, with the distance; where its crank
+    does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
+    1.
     """
     target = Path(f"{Path(mechanism).stem}.html") if out is None else out
-    _check_target(target)
+    if target.suffix.lower() not in (".html", _URDF):
+        raise ConfigError("--out", str(target), "expected a file that ends in .html or .urdf")
+    common.check_file("--out", target)
     from leg_wear_monitor.mechanism.loader import load_mechanism
 
     leg = load_mechanism(mechanism)
@@ -128,8 +129,7 @@ def draw(mechanism: str, out: Path | None) -> int:
         if target.suffix.lower() == _URDF:
             from leg_wear_monitor.mechanism.urdf import urdf
 
-            head, _, robot = urdf(leg).partition("\n")
-            text, words = f"{head}\n<!-- made by {_OURS.decode()} -->\n{robot}", leg.name
+            text, words = urdf(leg), leg.name
         else:
             from leg_wear_monitor.mechanism.reach import findings, headline, reach_of
             from leg_wear_monitor.report.drawing import drawing_html
@@ -141,16 +141,6 @@ def draw(mechanism: str, out: Path | None) -> int:
     for finding in found:
         click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
     return common.WITH_FINDINGS if found else 0
-
-
-def _check_target(path: Path) -> None:
-    """Make sure that a drawing can be written, and that it replaces none but a drawing."""
-    if path.suffix.lower() not in (".html", _URDF):
-        raise ConfigError("--out", str(path), "expected a file that ends in .html or .urdf")
-    common.check_file("--out", path)
-    if path.is_file() and _OURS not in path.read_bytes()[:4096]:
-        fault = "exists and is not a drawing of this command. Expected a different --out FILE"
-        raise ConfigError("--out", str(path), fault)
 
 
 # ``leg-wear-monitor simulate``: the leg offline, ideal or with clearances.

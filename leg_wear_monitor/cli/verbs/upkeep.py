@@ -75,10 +75,17 @@ def _withdraw(monitor: "WearMonitor", joint: str) -> str:
 
 
 def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
-    """Have a running monitor do it, print its reply, and return the exit code."""
+    """Have a running monitor do it; a service that is called twice confirms a reset."""
+    common.need_rclpy()
+    from leg_wear_monitor.ros.measure import trigger_on
+
+    return _answered(trigger_on(node, service, wait_s, times))
+
+
+def _answered(reply: str) -> int:
+    """Print the reply of a running monitor, and return the exit code."""
     from leg_wear_monitor.monitor.forecast.measurement import has_codes
 
-    reply = common.trigger(node, service, wait_s, times)
     click.echo(reply)
     return common.WITH_FINDINGS if has_codes(reply) else 0
 
@@ -206,19 +213,11 @@ def measure(
         raise click.UsageError("expected JOINT MM --sigma MM, or JOINT --withdraw")
     size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
     if node is not None and is_live:
-        return _on_node(node, *size, accept=accept, wait_s=wait_s)
+        common.need_rclpy()
+        from leg_wear_monitor.ros.measure import measure_on
+
+        return _answered(measure_on(node, *size, accept, wait_s))
     with opened(config, ledger, node, joint) as monitor:
         found = monitor.measure(*size, time.time_ns(), getpass.getuser(), accept)
     click.echo("\n".join(found.lines))
     return common.WITH_FINDINGS if found.codes else 0
-
-
-def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
-    """Enter it into a running monitor, which says the same as the verb does with a ledger."""
-    common.need_rclpy()
-    from leg_wear_monitor.monitor.forecast.measurement import has_codes
-    from leg_wear_monitor.ros.measure import measure_on
-
-    reply = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
-    click.echo(reply)
-    return common.WITH_FINDINGS if has_codes(reply) else 0

@@ -51,7 +51,6 @@ class PaceConfig:
     )
     ramp_s: float = quantity("s", "duration of a change of speed", above=0.0, default=0.5)
     ripple: float = _fraction("speed ripple, as a fraction of the speed", at_most=0.9)
-    ripple_per_turn: float = quantity("", "waves of the ripple in a turn", above=0.0, default=2.0)
 
     def __attrs_post_init__(self) -> None:
         if len(self.speeds_rpm) != len(self.times_s):
@@ -73,9 +72,6 @@ class EncoderConfig:
     )
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
-    restarts_s: tuple[float, ...] = _not_negative(
-        "s", "times at which the encoder restarts at 0; empty for never", ()
-    )
 
 
 @attrs.frozen(kw_only=True)
@@ -92,10 +88,9 @@ class JointEncodersConfig:
     )
     noise_rad: float = _not_negative("rad", "noise of the angles, standard deviation", 1.0e-4)
     offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; 0 if empty", default=())
-    scale_errors: tuple[float, ...] = quantity("", "relative scale error of each; 0 if empty", default=())
 
     def __attrs_post_init__(self) -> None:
-        for key in ("joints", "offsets_rad", "scale_errors"):
+        for key in ("joints", "offsets_rad"):
             given = len(getattr(self, key))
             if given != len(self.names) and (given or key == "joints"):
                 fault = f"has {given} values for {len(self.names)} encoders. Expected one each"
@@ -119,7 +114,6 @@ class TorqueSensorConfig:
     )
     noise_nm: float = _not_negative("N m", "noise, standard deviation", 0.05)
     resolution_nm: float = _not_negative("N m", "step of the reading, 0 for none", 0.01)
-    offset_nm: float = quantity("N m", "reading without torque", default=0.0)
 
 
 @attrs.frozen(kw_only=True)
@@ -133,12 +127,7 @@ class FootLoadSensorConfig:
     )
     rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     noise_n: float = _not_negative("N", "noise of each component, standard deviation", 1.0)
-    scale: float = quantity("", "reading over force; negative to reverse the sign", default=1.0)
-    zero_n: float = quantity("N", "vertical reading without force", default=0.0)
-    zero_drift_n_per_s: float = quantity("N/s", "growth of the zero", default=0.0)
-    stuck_from_s: float = _not_negative("s", "time from which the reading is stuck; 0 for never")
     silent_from_s: float = _not_negative("s", "time from which no message comes; 0 for never")
-    is_swapped: bool = described("read the foot of the other leg, half a turn later", default=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -174,15 +163,6 @@ class LoadConfig:
         GROUND_SHAPES,
         "shape of the ground's force: the monitor's template of stance, or a measured stance on a treadmill",
         default=TEMPLATE,
-    )
-    vertical_waves: tuple[float, ...] = quantity(
-        "",
-        "vertical shape, as coefficients of sin(k pi s) with s from 0 to 1 in "
-        "stance; if empty, the shape above applies",
-        default=(),
-    )
-    fore_aft_waves: tuple[float, ...] = quantity(
-        "", "fore-aft shape in the same form; positive values brake", default=()
     )
     heel_strike_shift: float = _shift("delay of the heel strike from its nominal phase, in gait cycles")
     toe_off_shift: float = _shift("delay of the toe-off from its nominal phase, in gait cycles")

@@ -115,12 +115,9 @@ def _stance(mechanism: Mechanism, config: GaitConfig) -> Stance:
 
 def _shape(load: LoadConfig, s: Floats) -> tuple[Floats, Floats]:
     """Vertical and fore-aft force (n,) over their peaks, at fractions (n,) of stance; 0 beyond 1."""
-    known = stance_template(s) if load.shape == TEMPLATE else [_waves(one, s) for one in _TREADMILL]
-    vertical, along = (
-        _waves(own, s) if own else one
-        for own, one in zip((load.vertical_waves, load.fore_aft_waves), known, strict=True)
-    )
-    return vertical, along
+    if load.shape == TEMPLATE:
+        return stance_template(s)
+    return _waves(_TREADMILL[0], s), _waves(_TREADMILL[1], s)
 
 
 def _waves(coefficients: tuple[float, ...], s: Floats) -> Floats:
@@ -129,6 +126,9 @@ def _waves(coefficients: tuple[float, ...], s: Floats) -> Floats:
 
 
 # Crank motion: a sequence of speeds joined by smooth ramps, with a phase-dependent ripple.
+
+
+_RIPPLE_PER_TURN = 2.0  # waves: the load of a leg has two swings a turn
 
 
 class _Stretch(NamedTuple):
@@ -149,7 +149,7 @@ class Pace:
 
     def __init__(self, config: PaceConfig) -> None:
         self._ramp = config.ramp_s
-        self._ripple, self._waves = config.ripple, config.ripple_per_turn
+        self._ripple = config.ripple
         speeds = [rpm * TURN / 60.0 for rpm in config.speeds_rpm]
         self._stretches, self._since = [_Stretch(0.0, 0.0, speeds[0], speeds[0])], [0.0]
         for (_, end), (before, after) in zip(pairwise(config.times_s), pairwise(speeds), strict=True):
@@ -159,7 +159,7 @@ class Pace:
     def at(self, t: float) -> CrankMotion:
         """Crank motion at a time [s]."""
         angle, speed, acceleration = self._even(t)
-        r, h = self._ripple, self._waves
+        r, h = self._ripple, _RIPPLE_PER_TURN
         sine, factor = math.sin(h * angle), 1.0 + r * math.cos(h * angle)
         return CrankMotion(
             angle + r / h * sine, speed * factor, acceleration * factor - speed * speed * r * h * sine

@@ -107,26 +107,20 @@ def _measured(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     load_times: Iterator[tuple[float, int]] = iter(())
     if load_config.source != NO_LOAD:
         load_times = _times(load_config.rate_hz, jitter_s, load_noise, LOAD)
-    foot_force_n = 0.0, 0.0
-    zero_rad, restarts_s = 0.0, list(config.encoder.restarts_s)
     last_torque_s, last_impulse = 0.0, 0.0  # for the mean torque since the last torque reading
     for t, kind in heapq.merge(crank_times, torque_times, load_times):
         if config.duration_s and t >= config.duration_s:
             return
         instant = leg.advance(t)
         if kind == LOAD:
-            if not load_config.stuck_from_s or t < load_config.stuck_from_s:
-                foot_force_n = _foot_load(load_config, leg, instant.crank.angle, t, load_noise)
+            foot_force_n = _foot_load(load_config, leg, instant.crank.angle, load_noise)
             if not load_config.silent_from_s or t < load_config.silent_from_s:
                 yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, (), foot_force_n)
             continue
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
         encoder_rad: tuple[float, ...] = ()
         if kind == CRANK:
-            while restarts_s and t >= restarts_s[0]:
-                zero_rad = instant.crank.angle
-                restarts_s.pop(0)
-            angle, velocity = _encoder(config.encoder, instant.crank, zero_rad, crank_noise)
+            angle, velocity = _encoder(config.encoder, instant.crank, crank_noise)
             encoder_rad = _joint_encoders(config.joint_encoders, instant.encoder_rad, encoder_noise)
         if kind == TORQUE or is_torque_with_crank:
             mean_nm = (instant.torque_impulse - last_impulse) / (t - last_torque_s)
@@ -143,9 +137,9 @@ def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator
         yield i / rate_hz + min(most, max(-most, jitter_s * noise.normal())), kind
 
 
-def _encoder(config: EncoderConfig, crank: CrankMotion, zero_rad: float, noise: Noise) -> tuple[float, float]:
-    """Crank angle [rad] and velocity [rad/s] as measured; `zero_rad` is where the encoder last restarted."""
-    angle = crank.angle - zero_rad + config.offset_rad + config.noise_rad * noise.normal()
+def _encoder(config: EncoderConfig, crank: CrankMotion, noise: Noise) -> tuple[float, float]:
+    """Crank angle [rad] and velocity [rad/s] as measured."""
+    angle = crank.angle + config.offset_rad + config.noise_rad * noise.normal()
     velocity = crank.speed + config.velocity_noise_radps * noise.normal()
     if config.counts_per_turn:
         step = TURN / config.counts_per_turn
@@ -157,31 +151,28 @@ def _joint_encoders(
     config: JointEncodersConfig, angles: tuple[float, ...], noise: Noise
 ) -> tuple[float, ...]:
     """Angles of the joint encoders as measured [rad]."""
-    none = (0.0,) * len(angles)
-    errors = zip(angles, config.offsets_rad or none, config.scale_errors or none, strict=True)
-    return tuple(
-        angle * (1.0 + scale) + offset + config.noise_rad * noise.normal() for angle, offset, scale in errors
-    )
+    offsets = config.offsets_rad or (0.0,) * len(angles)
+    pairs = zip(angles, offsets, strict=True)
+    return tuple(angle + offset + config.noise_rad * noise.normal() for angle, offset in pairs)
 
 
 def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float:
     """Drive torque as measured [N m]."""
-    reading = torque_nm + config.offset_nm + config.noise_nm * noise.normal()
+    reading = torque_nm + config.noise_nm * noise.normal()
     if config.resolution_nm:
         reading = round(reading / config.resolution_nm) * config.resolution_nm
     return reading
 
 
 def _foot_load(
-    config: FootLoadSensorConfig, leg: SyntheticLeg, angle: float, t: float, noise: Noise
+    config: FootLoadSensorConfig, leg: SyntheticLeg, angle: float, noise: Noise
 ) -> tuple[float, float]:
     """Horizontal and vertical foot force as measured [N]; of a contact switch, 0 and whether it is closed."""
-    x, y = leg.foot_force_n(angle + (math.pi if config.is_swapped else 0.0))  # swapped: half a turn later
+    x, y = leg.foot_force_n(angle)
     if config.source == CONTACT:
         return 0.0, float(y > _SWITCH_N)
     x, y = x + config.noise_n * noise.normal(), y + config.noise_n * noise.normal()
-    y += config.zero_n + config.zero_drift_n_per_s * t
-    return config.scale * x if config.source == WRENCH else 0.0, config.scale * y
+    return x if config.source == WRENCH else 0.0, y
 
 
 def _transported(measured: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:

@@ -71,7 +71,6 @@ def test_a_leg_that_walks_backwards_stands_in_the_same_turn_in_reverse() -> None
     ("load", "at_s", "vertical_n", "back_n"),
     [
         ({"heel_strike_transient": 1.0}, 0.01, 300.0, 0.0),  # beyond the force without it
-        ({"vertical_waves": (0.0, 0.0, 1.0), "fore_aft_waves": (1.0,), "fore_aft": 0.2}, 0.0652, 300.0, 30.0),
         ({"shape": "treadmill", "fore_aft": 0.0}, 0.0, 0.0, 0.0),
     ],
 )

@@ -106,16 +106,6 @@ def test_shares_are_met() -> None:
     assert len(set(faulty)) > 5
 
 
-def test_an_encoder_that_starts_anew_counts_from_zero() -> None:
-    anew = attrs.evolve(CLEAN, encoder=attrs.evolve(CLEAN.encoder, restarts_s=(0.0, 1.2)))
-    crank = [reading for reading in heard(anew) if reading.kind == CRANK]
-    begins = {1.2: next(one.taken_s for one in crank if one.taken_s >= 1.2), 0.0: crank[0].taken_s}
-    for one in crank:
-        begin_s = begins[1.2 if one.taken_s >= 1.2 else 0.0]
-        assert one.crank_angle_rad == pytest.approx(6.0 * (one.taken_s - begin_s), abs=1.0e-12)
-        assert one.crank_velocity_radps == 6.0
-
-
 def test_nothing_is_heard_in_a_gap() -> None:
     taken = np.array([reading.taken_s for reading in heard(gaps_s=(0.5, 1.2), gap_s=0.25)])
     assert not ((taken >= 0.5) & (taken < 0.75)).any()

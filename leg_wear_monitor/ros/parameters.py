@@ -7,17 +7,13 @@ from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
-from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rosgraph_msgs.msg import Clock
 
-from leg_wear_monitor.errors import ConfigError, did_you_mean, printable
+from leg_wear_monitor.errors import ConfigError, did_you_mean
 from leg_wear_monitor.monitor.config.parameters import (
     Parameter,
     changed,
@@ -37,8 +33,6 @@ _ARRAYS = (
     RosParameter.Type.DOUBLE_ARRAY,
     RosParameter.Type.STRING_ARRAY,
 )
-
-_TYPES = frozenset(one.value for one in RosParameter.Type)
 
 _CLOCK = "use_sim_time"
 _QOS_OVERRIDES = "qos_overrides."
@@ -88,34 +82,16 @@ class ParameterNode(Node):
             if name.startswith(_QOS_OVERRIDES) and name not in known
         )
 
-    def create_service(
-        self, srv_type: Any, srv_name: str, callback: Callable[[Any, Any], Any], **options: Any
-    ) -> Service:
-        """Create a service; rclpy creates its parameter services by this function as well.
-
-        Requests with a parameter of a type that does not exist do not reach the callback: rclpy raises an
-        exception for it, which ends the node.
-        """
-        if srv_type is SetParameters:
-            callback = _each_of_a_type(callback)
-        elif srv_type is SetParametersAtomically:
-            callback = _all_of_a_type(callback)
-        return super().create_service(srv_type, srv_name, callback, **options)
-
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *options: Any, **named: Any
     ) -> Subscription:
-        """Create a subscription; rclpy creates its ``/clock`` subscription by this function as well.
-
-        A time before 0 does not reach the callback: rclpy raises an exception for it, which ends the node.
+        """Create a subscription.
 
         Raises
         ------
         ConfigError
             If the quality of service that parameters set for this topic cannot be used.
         """
-        if msg_type is Clock:
-            callback = self._times_of(callback)
         with self._qos_checked(topic):
             return super().create_subscription(msg_type, topic, callback, *options, **named)
 
@@ -148,18 +124,6 @@ class ParameterNode(Node):
             values = ", ".join(f"{name}: {value}" for name, value in given.items())
             fault = f"{values} cannot be used: {str(error).split(', at /')[0]}"
             raise ConfigError(self.get_fully_qualified_name(), "", fault) from error
-
-    def _times_of(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        def take(message: Clock) -> None:
-            if message.clock.sec >= 0:
-                callback(message)
-            else:
-                self.get_logger().warning(
-                    f"{_CLOCK}: a time of {message.clock.sec} s on /clock is before 0 and is ignored",
-                    throttle_duration_sec=10.0,
-                )
-
-        return take
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set parameters, all or none.
@@ -208,42 +172,6 @@ class ParameterNode(Node):
             return False
         now = self.get_parameter(one.name)
         return now.type_ is one.type_ and plain(now) == plain(one)
-
-
-def _type_fault(parameter: ParameterMessage) -> str:
-    """Why a parameter of a request is none; empty if it is one."""
-    if parameter.value.type in _TYPES:
-        return ""
-    name = printable(parameter.name, 100)
-    return f"{name}: {parameter.value.type} is not a type of a parameter. Expected 0 to {max(_TYPES)}"
-
-
-def _each_of_a_type(
-    callback: Callable[[SetParameters.Request, SetParameters.Response], SetParameters.Response],
-) -> Callable[[SetParameters.Request, SetParameters.Response], SetParameters.Response]:
-    def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
-        for one in request.parameters:
-            if fault := _type_fault(one):
-                response.results.append(SetParametersResult(successful=False, reason=fault))
-            else:
-                callback(SetParameters.Request(parameters=[one]), response)  # appends its result
-        return response
-
-    return answer
-
-
-def _all_of_a_type(
-    callback: Callable[[SetParametersAtomically.Request, SetParametersAtomically.Response], Any],
-) -> Callable[[SetParametersAtomically.Request, SetParametersAtomically.Response], Any]:
-    def answer(
-        request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
-    ) -> SetParametersAtomically.Response:
-        if fault := next(filter(None, map(_type_fault, request.parameters)), ""):
-            response.result = SetParametersResult(successful=False, reason=fault)
-            return response
-        return callback(request, response)
-
-    return answer
 
 
 def plain(parameter: RosParameter) -> Any:

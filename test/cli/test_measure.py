@@ -212,7 +212,7 @@ def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, le
 
 
 def test_a_ledger_has_to_be_named(refused):
-    assert "no ledger given" in refused("measure", "A", "0.4", "--sigma", "0.01")
+    assert "no ledger is given" in refused("measure", "A", "0.4", "--sigma", "0.01")
 
 
 def test_of_a_file_for_two_legs_a_section_is_chosen_by_its_node(run, refused, worn_ledger, tmp_path):

@@ -37,7 +37,7 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
         started("gait-publisher", logs["gait-publisher"], "-p", f"truth.path:={truth}"),
     ]
     try:
-        for log, word in zip(logs.values(), (b"nothing in it is used", b"walking"), strict=True):
+        for log, word in zip(logs.values(), (b"this file is not used", b"walking"), strict=True):
             stage.wait_for(lambda log=log, word=word: word in log.read_bytes(), f"{word} in {log}")
         for node in nodes:
             node.send_signal(signal.SIGTERM)

@@ -88,7 +88,7 @@ def raised(*kinds: str, least: Level = Level.ERROR, most: Level = Level.ERROR) -
 
 
 def _of_alarms(situation: Situation, holds: Callable[[Alarm], bool]) -> list[Hit]:
-    return [hit_of(alarm, situation) for alarm in situation.alarms if holds(alarm)]
+    return [hit_of(alarm, situation) for alarm in situation.alarms if alarm.level and holds(alarm)]
 
 
 def _is_of_input(alarm: Alarm) -> bool:

@@ -18,7 +18,7 @@ class Channel:
     Attributes
     ----------
     delay_s : float
-        Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
+        Delay of the samples relative to their crank angle: the lag minus the crank offset divided by the
         speed.
     time_constant_s : float
         T of the low-pass 1 / (1 + T s + c T² s²): the time by which it delays slow changes; 0 without one.

@@ -257,7 +257,7 @@ class SimulatedSensor:
         return self.signatures_of(torque + self._sensor.noise_nm * self.noise(leg))
 
     def draws(self, leg: int) -> Floats:
-        """Signatures (draws, cycles, F) of a leg, each time with other noise; the first are `signatures`."""
+        """Signatures (draws, cycles, F) of a leg with different noise; the first draw is `signatures`."""
         torque = self.torque(leg)
         noisy = (torque + self._sensor.noise_nm * self.noise(leg, draw) for draw in range(_DRAWS))
         return np.array([self.signatures_of(one) for one in noisy])

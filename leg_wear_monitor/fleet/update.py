@@ -277,7 +277,7 @@ def leg_state(leg: FleetLeg, directory: Path) -> LegState | None:
     if content is None or content.entry is None:
         return None
     summary = _summary(directory / SUMMARY)
-    if summary is not None and content.runs[-1].spans:  # an operator's run counts no time
+    if summary is not None and content.runs[-1].spans:  # a run of an operator's action adds no time
         return with_same_fields(LegState, summary, alarms=attrs.evolve(summary.alarms, changes=()))
     ledger = attrs.evolve(leg.config.ledger, path=str(directory / LEDGER))
     now = state_in_ledger(load_mechanism(leg.config.mechanism), attrs.evolve(leg.config, ledger=ledger))

@@ -40,7 +40,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
 POINTS = 512  # entries of the force's table: 2 ms at 60 rpm, a tenth of the transient
 
 _TRANSIENT_S = 0.02
-_FURTHEST = 3.0  # standard deviations: further steps are drawn in, so that stance never meets the next one
+_FURTHEST = 3.0  # bound in standard deviations, so that a stance never overlaps the next one
 
 # Walking on a treadmill, mean of three stances (opensim-models, Rajagopal, grf_walk.mot): coefficients of
 # sin(k pi s) of the vertical and of the fore-aft force, over their peaks

@@ -466,7 +466,7 @@ def _angle(one: torque_fit.Fit) -> float:
 
 
 def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
-    """Why the best fit need not be the truth; empty if it is."""
+    """Reason why the best fit may be wrong; empty if it is certain."""
     if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
         return (
             f"the drive torque does not fit this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "

@@ -547,7 +547,7 @@ INPUT_RULES = (
         do="check topic, unit and source of the drive torque; until then, rock the joints by hand regularly",
     ),
 )
-"""In the order of precedence: faults of the crank come first, for a torque is compared at its angles."""
+"""In the order of precedence: faults of the crank come first, because torques are compared at its angles."""
 
 
 @attrs.frozen

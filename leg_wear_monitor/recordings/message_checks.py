@@ -146,7 +146,7 @@ class WrenchAxis:
         is_still = rms[largest] <= _SWINGS * self._predicted_nm
         if is_still or rms[self._axis] > _STILL * rms[largest]:
             return ""
-        # without values, for each change of a message is a line of the log
+        # without values, because each change of a message adds a line to the log
         return (
             f"the torque about {_AXES[self._axis]} does not change, the one about {_AXES[largest]} does; "
             f"if that is the drive's, set drive_torque.axis to {_AXES[largest]}"

@@ -102,7 +102,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
 
 
 def _differences(mechanism: Mechanism, sensors: Sequence[str], of_bodies: Floats) -> Floats:
-    """Values (P, m, ...) at the sensors of bodies' values (P, n, ...): journal's minus bushing's body."""
+    """Sensor values (P, m, ...) from values of bodies (P, n, ...): journal body minus bushing body."""
     names = body_names(mechanism)
     pairs = [[names.index(body) for body in mechanism.sides(joint)] for joint in sensors]
     return np.stack([of_bodies[:, j] - of_bodies[:, b] for b, j in pairs], axis=1)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor replay``: a recording through the same monitor that runs live.
 
 
-# Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
+# Names are repeated here, because --help must not wait for numba; tests compare them with the library.
 TIMES = ("header", "log", "publish")
 
 

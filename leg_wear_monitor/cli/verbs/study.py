@@ -146,7 +146,7 @@ def draw(mechanism: str, out: Path | None) -> int:
 # ``leg-wear-monitor simulate``: the leg offline, ideal or with clearances.
 
 
-# Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
+# Names are repeated here, because --help must not wait for numba; tests compare them with the library.
 MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
 
 # a motion too short to take time, but through all of the code

@@ -336,7 +336,7 @@ def _factor_since(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear
 
 
 def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tuple[Floats, Floats]:
-    """Grid (g,) over the factor's logarithm where its density is, and the logarithm of that, (g,).
+    """Grid (g,) over the logarithm of the factor where its density is significant, and the log density (g,).
 
     Parameters
     ----------

@@ -268,7 +268,7 @@ class Stretch:
     repeated : float
         Fraction of the crank samples that repeat a stamp with a different angle.
     spikes : float
-        Fraction of the torques that the guard left out as outliers; 0 if they are few.
+        Fraction of the torques that are outliers or no numbers; 0 if they are few.
     size_nm : float
         RMS of the predicted drive torque.
     config : MonitorConfig
@@ -330,6 +330,15 @@ def of_torque(samples: Samples) -> Samples:
     return known
 
 
+def _without_number(samples: Samples) -> int:
+    """Number of drive torques that are NaN or infinite, in their own stream or among the efforts."""
+    is_known = np.isin(samples["fault"], (NO_FAULT, NOT_FINITE))
+    is_number = np.isfinite(samples["torque_nm"]) & (samples["fault"] == NO_FAULT)
+    own = np.count_nonzero(is_known & (samples["kind"] == TORQUE) & ~is_number)
+    has_effort = np.isfinite(samples["torque_nm"][is_known & (samples["kind"] == CRANK)])
+    return int(own) + (int(np.count_nonzero(~has_effort)) if has_effort.any() else 0)
+
+
 _LEAST = 20  # samples of a stretch: fewer say nothing of its stamps and its values
 _MOVING_RAD, _STILL_RAD = 0.5, 1.0e-3  # turned in a stretch: the crank turns, it stands
 _SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # scatter of stamps: over the period, and times the crank's speed
@@ -340,8 +349,8 @@ _FROZEN = 0.2  # fraction of a gait cycle in which a torque that freezes has the
 _STEADY = 0.5  # largest relative difference of the speeds in two halves of a stretch
 _IN_TURNS = 0.1  # largest relative difference from the commanded speed, if in turns instead of radians
 _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times as often as the next value
-# fraction of torque samples that are outliers: fewer are counted and left out, so many are a fault until they
-# are far fewer
+# fraction of torque samples that are outliers or no numbers: fewer are counted and left out, so many are a
+# fault until they are far fewer, because the time over which the next torque is a mean is not known
 _SPIKES, _FEWER_SPIKES = 0.05, 0.02
 _LEAST_SPIKES = 10  # fewer than that may come together by chance
 _ALIKE = 0.5  # correlation of torques over the crank angle
@@ -509,8 +518,8 @@ INPUT_RULES = (
         code=SPIKES,
         kind=TORQUE,
         words=_spikes,
-        why="{percent} % of the drive torques are spikes since {since}" + _NO_JOINT,
-        do="check the cable of the torque sensor and its supply",
+        why="{percent} % of the drive torques are spikes or no numbers since {since}" + _NO_JOINT,
+        do="check the cable of the torque sensor and its supply; publish a torque with each measurement only",
     ),
     InputRule(
         code="TORQUE_SATURATED",
@@ -740,8 +749,9 @@ class InputJudge:
             words, stamps = {"size": amount(state.jumped_rad, "rad")}, cranks["stamp_ns"]
             self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))
         last = np.concatenate(state.pieces[-_PERIODS:])
-        found = spikes - state.spikes[0]
-        part = found / max(1, found + len(of_torque(np.concatenate(state.pieces))))
+        kept = np.concatenate(state.pieces)
+        found = spikes - state.spikes[0] + _without_number(kept)
+        part = found / max(1, found + len(of_torque(kept)))
         most = _FEWER_SPIKES if SPIKES in state.faults else _SPIKES
         if found <= _LEAST_SPIKES or part <= most:
             part = 0.0

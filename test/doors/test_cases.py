@@ -121,6 +121,10 @@ CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     ),
     "torque held": (torques(lambda torque: torque[np.arange(len(torque)) // 8 * 8]), "TORQUE_HELD"),
     "1e300": (replaced(0.08, 1.0e300), "TORQUE_SPIKES"),
+    "every second is NaN": (
+        torques(lambda torque: np.where(np.arange(len(torque)) % 2, torque, np.nan)),
+        "BAD_INPUT",
+    ),
     "noise": (
         torques(lambda torque: 8.0 * np.random.default_rng(1).standard_normal(len(torque))),
         "TORQUE_NOT_OF_GAIT",

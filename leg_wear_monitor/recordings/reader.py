@@ -30,6 +30,7 @@ from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
     MISSING_JOINT,
     NO_FAULT,
+    NOT_FINITE,
     ZERO_STAMP,
     Samples,
 )
@@ -72,6 +73,9 @@ def check_topics(
     return findings
 
 
+_WITH_CRANK = (NO_FAULT, NOT_FINITE, ZERO_STAMP)  # faults of messages that have the crank
+
+
 class JointNames:
     """Searches the messages of a recording for the crank joint and its interfaces.
 
@@ -92,7 +96,7 @@ class JointNames:
         """Count messages, using the samples decoded from them."""
         messages = piece.messages
         cranks = messages["type"] == JOINT_STATE
-        self._found += int(np.count_nonzero(cranks & (samples["fault"] != MISSING_JOINT)))
+        self._found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _WITH_CRANK)))
         missing = messages[cranks & (samples["fault"] == MISSING_JOINT)]
         self._missing += len(missing)
         if len(missing):

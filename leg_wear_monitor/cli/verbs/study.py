@@ -112,10 +112,9 @@ _URDF = ".urdf"
 def draw(mechanism: str, out: Path | None) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
 
-    The HTML page moves the mechanism through its cycle; it is one file and needs no network. Where the
-    mechanism does not close, its bodies are drawn apart at the open joint, with the distance; where its crank
-    does not turn through, the page shows the range and the bodies in line at its ends. The exit code is then
-    1.
+    The HTML page moves the mechanism through its cycle; it is one file and needs no network. If the mechanism
+    does not close, the page shows the open joint and its distance. If the crank does not turn through, the
+    page shows its range and the bodies in line at its ends. The exit code is then 1.
     """
     target = Path(f"{Path(mechanism).stem}.html") if out is None else out
     if target.suffix.lower() not in (".html", _URDF):

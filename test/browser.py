@@ -46,5 +46,6 @@ def browse(pages, directory, script):
     line += ["--window-size=1300,1000", "--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
     done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
     found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)
-    console = [said for said in done.stderr.splitlines() if "CONSOLE" in said]
+    lines = done.stderr.splitlines()  # the browser's own pages write to its console as well
+    console = [said for said in lines if "CONSOLE" in said and "source: chrome://" not in said]
     return json.loads(html.unescape(found)), console

@@ -95,6 +95,7 @@ def study_page(results: StudyResults) -> Page:
         sections=[Section(title, each) for title, each in parts.items() if each],
         configuration=buffer.getvalue(),
         versions={**results.versions, "seed": str(results.settings.ensemble.seed)},
+        has_dark=True,
     )
 
 

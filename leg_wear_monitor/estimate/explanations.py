@@ -51,7 +51,7 @@ _ANYTHING_ELSE = "something else"
 # linear columns can show and a leg can have
 POOREST, _PART = 4.0, 0.3  # or this part of the residual without it: a large opening is known less well
 _POSSIBLE = {
-    Cause.MASS: (-0.9, 1.0),
+    Cause.MASS: (-0.9, 0.95),  # not at the end of the tried factors, where an opening may hide
     Cause.LENGTH: (-0.1, 0.1),
     Cause.SCALE: (0.2, 2.0),
     Cause.TIMING: (-0.1, 0.1),

@@ -34,7 +34,7 @@ from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_pr
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, newest, of_crank, within
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
-_SPIKE = 10.0  # size of a spike, over the size that nine of ten torques do not exceed
+_SPIKE = 30.0  # size of a spike over the size that nine of ten torques do not exceed; impacts have up to 17
 _LEAST_SWING, _LEAST_TORQUE = 1.0e-6, 1.0e-9  # swing of a changing torque: over its size, and in its unit
 
 

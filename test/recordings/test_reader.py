@@ -149,7 +149,7 @@ def test_topics_in_a_namespace_are_found_and_several_must_be_named(tmp_path, sen
     assert recording.topics["joint_states"] == "/left/joint_states"
     assert samples.tobytes() == expected(sent).tobytes()
     both = write_bag(tmp_path / "two.mcap", renamed(sent, "/left") + renamed(sent, "/right"))
-    with pytest.raises(RecordingError, match="could be /left/joint_states, /right/joint_states, select"):
+    with pytest.raises(RecordingError, match="could be /left/joint_states, /right/joint_states; select"):
         read(both)
     named = {"joint_states": "right/joint_states", "drive_torque": "/right/drive_torque"}
     assert read(both, **named)[0].tobytes() == expected(sent).tobytes()

@@ -251,8 +251,8 @@ class CsvTable(Table):
         self._file.seek(0)
         try:
             for batch in self._reader(names, [names[k] for k in columns], skip):
-                lines = np.setdiff1d(line + np.arange(batch.num_rows + len(skipped)), skipped)
-                lines = lines[: batch.num_rows]
+                lines = line + np.arange(batch.num_rows + len(skipped))
+                lines = np.setdiff1d(lines, skipped)[: batch.num_rows] if skipped else lines
                 line = int(lines[-1]) + 1 if len(lines) else line
                 filled = np.any([np.asarray(column.is_valid()) for column in batch.columns], axis=0)
                 chosen = [column.filter(pa.array(filled)) for column in batch.columns]
@@ -571,9 +571,9 @@ class TableFile:
             parts.append((row, self._samples(self._streams[number].kind, rows, row, stamps[row]), messages))
         if not parts:
             return Piece(start_ns, _NO_DATA, np.zeros(0, MESSAGE), rows.stored, np.zeros(0, GAIT_SAMPLE))
-        row, samples, messages = (np.concatenate(column) for column in zip(*parts, strict=True))
-        order = np.argsort(row, kind="stable")
-        return Piece(start_ns, _NO_DATA, messages[order], rows.stored, samples[order])
+        places, samples, heads = zip(*parts, strict=True)
+        order = np.argsort(np.concatenate(places), kind="stable")
+        return Piece(start_ns, _NO_DATA, _in_order(heads, order), rows.stored, _in_order(samples, order))
 
     def _log_time_ns(self, stamp_ns: _Ints) -> _Ints:
         """Times that keep the rows in order: the stamps, but where a stamp goes back, the time stands."""
@@ -616,6 +616,12 @@ class TableFile:
 
 
 _NO_DATA = np.zeros(0, np.uint8)
+
+
+def _in_order(parts: Sequence[NDArray[Any]], order: _Ints) -> NDArray[Any]:
+    """Records of all parts in an order; copied as bytes, because numpy copies each field on its own."""
+    as_bytes = np.dtype((np.void, parts[0].itemsize))
+    return np.concatenate([part.view(as_bytes) for part in parts])[order].view(parts[0].dtype)
 
 
 def _fault_of(good: _Bools) -> NDArray[np.int64]:

@@ -267,6 +267,7 @@ def simulate(
     restitution: float | None = None,
     friction: str | None = None,
     friction_coefficient: float | None = None,
+    toe: str | None = None,
     trace: int = 0,
     intervals: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -299,6 +300,8 @@ def simulate(
         Friction law of all clearance joints.
     friction_coefficient : float, optional
         Friction coefficient of all clearance joints.
+    toe : str, optional
+        Point whose motion is reported, with its body, such as ``shank.G``; default: the point called ``toe``.
     trace : int
         Stored samples per cycle; 0 for none. The first is where counting starts: at crank angle 0 after whole
         ``skip_cycles``, and of the ideal leg. In model ``clearance`` they are taken at the end of an interval
@@ -335,6 +338,7 @@ def simulate(
     True
     """
     mechanism = given_mechanism(mechanism)
+    mechanism = mechanism if toe is None else mechanism.with_toe(toe)
     check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)
     check_kinds(intervals=intervals)
     of_contacts: dict[str, float | str | None] = {

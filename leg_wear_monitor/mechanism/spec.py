@@ -329,6 +329,8 @@ class Mechanism:
         Settings of every revolute joint that may have clearance: defaults merged with the joint's own.
     clearance_joints : tuple of str
         Default clearance joints.
+    toe_point : tuple of str, optional
+        Body and point whose motion is reported; default: the point called ``toe``.
     person_kg : float
         Mass of a person with one leg attached to the mechanism; the bodies include this leg. 0 for none.
     source : str
@@ -348,6 +350,7 @@ class Mechanism:
     loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
     clearances: dict[str, Clearance] = described("the joints with clearance and their settings", factory=dict)
     clearance_joints: tuple[str, ...] = ()
+    toe_point: tuple[str, str] | None = None
     person_kg: float = 0.0
     source: str
 
@@ -380,13 +383,30 @@ class Mechanism:
         fault = f"{name!r} is not a clearance joint. Expected one of {expected}{did_you_mean(name, known)}"
         raise ConfigError("JOINT", "", fault)
 
+    def with_toe(self, name: str) -> "Mechanism":
+        """The mechanism with a different point as its toe, such as ``shank.G``.
+
+        Raises
+        ------
+        ConfigError
+            If no moving body has this point.
+        """
+        body, _, point = name.partition(".")
+        if body not in self.bodies or point not in self.bodies[body].points:
+            known = [f"{one}.{each}" for one, spec in self.bodies.items() for each in spec.points]
+            fault = f"{name!r} is not a point of a body. Expected one of {', '.join(known)}"
+            raise ConfigError("toe", "", fault)
+        return attrs.evolve(self, toe_point=(body, point))
+
     def points_of(self, body: str) -> dict[str, Vector]:
         """Points of a body, the ground included, in its own frame [m]."""
         return self.ground.points if body == GROUND else self.bodies[body].points
 
     @property
     def toe(self) -> tuple[str, str] | None:
-        """Body and point whose motion is reported: the point called ``toe``; None without one."""
+        """Body and point with reported motion: ``toe_point``, or the point called ``toe``, or None."""
+        if self.toe_point:
+            return self.toe_point
         for body, spec in self.bodies.items():
             if "toe" in spec.points:
                 return body, "toe"

@@ -10,7 +10,7 @@ SHORT = {"cycles": 0.25, "skip_cycles": 0.0}
 
 
 @pytest.mark.parametrize("model", ["clearance", "full"])
-def test_laws_of_the_options_are_those_of_a_file(run, tmp_path, model: str) -> None:
+def test_laws_and_toe_of_the_options_are_those_of_a_file(run, tmp_path, model: str) -> None:
     text = (lw.share_directory() / "config" / "mechanisms" / "four_bar.yaml").read_text()
     assert "restitution: 0.9" in text and "law: ambrosio" in text
     changed = text.replace("restitution: 0.9", "restitution: 0.7").replace("law: ambrosio", "law: threlfall")
@@ -25,6 +25,16 @@ def test_laws_of_the_options_are_those_of_a_file(run, tmp_path, model: str) -> N
     assert json.loads(done.out)["joints"] == json.loads(own.to_json())["joints"]
 
 
+def test_any_point_is_a_toe() -> None:
+    """The toe of the leg is a point of its foot; a joint of the ground does not move."""
+    short = {"clearances": [], "cycles": 1.0, "trace": 8}
+    own, ankle = (lw.simulate("bionic_leg", toe=toe, **short).trace for toe in ("foot.toe", "foot.I"))
+    same = lw.simulate("bionic_leg", **short).trace
+    assert own is not None and ankle is not None and same is not None
+    assert (own.toe_x_m == same.toe_x_m).all()
+    assert (own.toe_x_m != ankle.toe_x_m).all()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -32,6 +42,7 @@ def test_laws_of_the_options_are_those_of_a_file(run, tmp_path, model: str) -> N
         ({"friction_coefficient": -1.0}, "friction-coefficient: -1.0 is not at least 0"),
         ({"friction_coefficient": "high"}, "friction-coefficient: 'high' is not a number"),
         ({"restitution": 2.0}, "restitution: 2.0 is not at most 1"),
+        ({"toe": "foot.heel"}, "toe: 'foot.heel' is not a point of a body. Expected one of"),
         ({"clearances": [], "friction": "none"}, "friction: is for clearance joints"),
     ],
 )

@@ -22,7 +22,7 @@ _CLASS_N = 100  # resolution of foot loads
 
 # fields of a mechanism that may change without a change of the worn parts
 # (a person is in the masses of the bodies)
-_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances", "person_kg")
+_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances", "toe_point", "person_kg")
 _FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # the other settings contain the values of the pair
 _FREE_OF_JOINTS = ("label",)
 

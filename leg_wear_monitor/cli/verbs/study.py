@@ -189,11 +189,21 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.Choice(NORMAL_LAWS),
 )
 @common.option(
+    "--restitution", "E", "Coefficient of restitution of all clearance joints.", type=common.POSITIVE
+)
+@common.option(
     "--friction",
     "NAME",
     f"Friction law of all clearance joints: {', '.join(FRICTION_LAWS)}.",
     type=click.Choice(FRICTION_LAWS),
 )
+@common.option(
+    "--friction-coefficient",
+    "MU",
+    "Friction coefficient of all clearance joints.",
+    type=common.Number(min=0.0),
+)
+@common.option("--toe", "BODY.POINT", "Point whose motion is reported.  [default: the point called toe]")
 @click.option(
     "--trace",
     type=click.IntRange(min=0),

@@ -1,6 +1,5 @@
 """YAML files within bounds, strict conversion to classes, libraries of files."""
 
-import json
 import math
 import reprlib
 import stat
@@ -18,6 +17,7 @@ from cattrs.gen import make_dict_structure_fn
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import CollectionStartEvent
 
 from leg_wear_monitor.configuration import FieldError
 from leg_wear_monitor.errors import ConfigError, did_you_mean, nearest
@@ -267,7 +267,7 @@ _converter.register_structure_hook_factory(_generic(tuple), _strict_tuple)
 _converter.register_structure_hook_factory(_generic(np.ndarray), _array)
 
 
-# Reads a YAML file within bounds of its size, its depth and its expanded aliases.
+# Reads a YAML file of bounded size, without lists and mappings that aliases expand.
 
 
 MOST_BYTES = 1_000_000  # the largest file of the package has 3000
@@ -290,14 +290,22 @@ def read_document(path: Path, source: str) -> Any:
     """
     try:
         text = _read_text(path, source)
+        _check_anchors(text, source)
         document = YAML(typ="safe", pure=True).load(text)
-        json.dumps(document, skipkeys=True, default=str)  # fails if the document contains itself
     except UnicodeDecodeError as error:
         raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
-    # an invalid date or number; a tag that does not fit its value; recursion
+    # an invalid date or number; a tag that does not fit its value; too deep
     except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
     return document
+
+
+def _check_anchors(text: str, source: str) -> None:
+    """Refuse an anchor of a list or mapping: a few lines of its aliases can fill any memory."""
+    for event in YAML(typ="safe", pure=True).parse(text):
+        if isinstance(event, CollectionStartEvent) and event.anchor:
+            fault = f"&{event.anchor} names a list or mapping. Expected a single value"
+            raise ConfigError(source, "", f"line {event.start_mark.line + 1}: {fault}")
 
 
 def _read_text(path: Path, source: str) -> str:

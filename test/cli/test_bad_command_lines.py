@@ -21,7 +21,7 @@ WRONG = [
     ("simulate --trace -1", ["--trace", "-1", "0"]),
     ("simulate --model half", ["--model", "'half'", "clearance", "full"]),
     ("simulate --normal-law newton", ["--normal-law", "'newton'", "flores"]),
-    ("simulate --speed-rpm 0", ["--speed-rpm", "0.0 rpm", "other than 0 rpm"]),
+    ("simulate --speed-rpm 0", ["--speed-rpm", "0.0 rpm", "Expected at least 0.01 rpm in either direction"]),
     ("simulate --clearance-m 0", ["--clearance-m", "0", "x>0"]),
     ("simulate --clearance-m 0.1", ["--clearance-m", "0.1", "bushing_radius of 0.01 m"]),
     ("simulate --clearances Q", ["--clearances", "'Q'", "bionic_leg.yaml", "A, B, C"]),

@@ -30,7 +30,7 @@ BROKEN = [
     ("radial_clearance: 0.0003", "radial_clearance: 0.3", ["defaults.radial_clearance", "0.3", "0.01 m"]),
     ("normal_law: lankarani-nikravesh", "normal_law: herz", ["defaults.normal_law", "'herz'", "hertz, "]),
     ("law: ambrosio", "law: coulomb", ["defaults.friction.law", "'coulomb'", "ambrosio, threlfall"]),
-    ("ramp: [0.001, 0.01]", "ramp: [0.1, 0.01]", ["friction.ramp", "[0.1, 0.01] m/s", "rise"]),
+    ("ramp: [0.001, 0.01]", "ramp: [0.1, 0.01]", ["friction.ramp", "[0.1, 0.01] m/s", "not above the first"]),
     ("joints: [A, B, G, I, J]", "joints: {A: {width: -1}}", ["clearances.joints.A.width", "-1.0", "0 m"]),
     ("label: knee", "label: <b>knee</b>", ["joints.G.label", "'<b>knee</b>'", "letters, digits"]),
     # keys
@@ -66,7 +66,7 @@ BROKEN = [
     # not YAML, or not a mechanism
     ("bodies:", "bodies: [", ["not YAML", "line 18"]),
     ("bodies:", "\tbodies:", ["not YAML", "line 16", "'\\t'"]),
-    ("bodies:", "bodies: *them", ["not YAML", "line 16", "'them'"]),
+    ("bodies:", "bodies: *them", ["not YAML", "line 17"]),
     ("name: bionic_leg", "name: \x07", ["not YAML", "#x0007"]),
     ("bodies:", "bodies: 7\nrest:", ["rest", "unknown key"]),
     # a linkage that cannot be, or cannot turn

@@ -98,7 +98,7 @@ def test_a_value_in_another_unit_is_doubted(run, bag, complaints, tmp_path):
     config = tmp_path / "monitor.yaml"
     config.write_text("/**:\n  ros__parameters:\n    wear_coefficients_per_pa: [2.0e-7]\n")
     (line,) = (each for each in complaints(run("replay", str(bag), "--config", config)) if "usual" in each)
-    assert line.startswith(f"warning: {config}: wear_coefficients_per_pa: 2e-07 1/Pa, usual are below")
+    assert line.startswith(f"warning: {config}: wear_coefficients_per_pa: 2e-07 1/Pa, usually below")
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
     [
         (["nowhere.mcap"], "error: nowhere.mcap: does not exist. Expected a bag directory"),
         ([], "error: Missing argument 'BAG...'. (see leg-wear-monitor replay --help)"),
-        (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is not a topic of the recording, it has"),
+        (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is not a topic of the recording; it has"),
         (["{bag}", "--config", "nowhere.yaml"], "error: nowhere.yaml: "),
         (["{bag}", "--time", "wall"], "error: Invalid value for '--time'"),
         (["{bag}", "--fail-on", "wear"], "error: Invalid value for '--fail-on'"),
@@ -179,7 +179,7 @@ def test_a_crank_that_is_in_no_message_is_refused_with_the_names_that_are_there(
     assert result.exit_code == 2
     assert result.stdout == ""
     assert complaints(result) == [
-        f"error: {bag}: wheel: is not among the joints of {SECONDS * RATE_HZ} messages, they have crank; set "
+        f"error: {bag}: wheel: is not among the joints of {SECONDS * RATE_HZ} messages; they have crank; set "
         "the crank with --crank-joint (crank_joint in the parameters)"
     ]
 
@@ -187,7 +187,7 @@ def test_a_crank_that_is_in_no_message_is_refused_with_the_names_that_are_there(
 @pytest.mark.parametrize(
     ("stamps", "angle", "why"),
     [
-        (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm, the commanded cadence is 60 rpm"),
+        (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm; the commanded cadence is 60 rpm"),
         (0 * STAMPS, TURNING, f"no crank sample can be used ({N} zero_stamp)"),
     ],
     ids=["a wheel", "no clock"],

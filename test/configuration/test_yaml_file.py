@@ -5,9 +5,14 @@ import pytest
 from leg_wear_monitor import ConfigError, load_config, load_mechanism
 from leg_wear_monitor.configuration.strict import MOST_BYTES
 
+LAUGHS = "a0: &a0 {x: 1, y: 2}\n" + "".join(
+    f"a{i + 1}: &a{i + 1} {{x: *a{i}, y: *a{i}, z: *a{i}}}\n" for i in range(40)
+)
 HOSTILE = {
-    "contains itself": ("/**: &x {ros__parameters: *x}", "is not YAML: Circular reference"),
-    "a list in itself": ("name: &x [*x]", "is not YAML: Circular reference"),
+    "contains itself": ("/**: &x {ros__parameters: *x}", "line 1: &x names a list or mapping"),
+    "a list in itself": ("name: &x [*x]", "line 1: &x names a list or mapping"),
+    "aliases of aliases": (LAUGHS, "line 1: &a0 names a list or mapping"),
+    "merge keys": ("a: 1\nb: &b {c: 1}\nd: {<<: *b}\n", "line 2: &b names a list or mapping"),
     "brackets": ("a: " + 1200 * "[", "is not YAML"),
     "code": ("name: !!python/object/apply:os.system ['touch pwned']", "is not YAML"),
     "a tag that does not fit": ("name: !!int many", "is not YAML"),

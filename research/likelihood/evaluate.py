@@ -106,14 +106,15 @@ class Trained:
         cycles = self._stored.signatures(case.state, drive, self._rng)[-n:]
         answer = self.leg.posterior(cycles.mean(axis=0), n)
         found = answer.found
+        first = max(JOINTS, key=lambda joint: answer.probability[joint])
         if found == SOME and len(case.opened) == 1:
-            first = max(JOINTS, key=lambda joint: answer.probability[joint])
             found = f"{'right' if first == case.opened[0] else 'wrong'} first"
         size_m = NEW_M * np.exp(answer.log_opening)
         counts.add(case.row + suffix, case.opened, found, 1e3 * (size_m - case.size_m))
         if len(case.opened) == 1 and n == 10:
             where = "ground" if self._stored.truth["peak_n"] else "in the air"
             counts.add(f"one joint, {where}, any drive", case.opened, found, 1e3 * (size_m - case.size_m))
+            counts.add(f"first of the joints, {where}", case.opened, first, 1e3 * (size_m - case.size_m))
 
 
 def trained(network: Network, legs: list[Stored], counts: Counts) -> None:
@@ -155,7 +156,7 @@ def healthy_hours(network: Network, legs: list[Stored], hours: float) -> dict[st
     each = round(3600 * hours / len(pairs))
     for stored, name in pairs:
         before, after = drives_of(name)
-        leg, healthy = Trained(network, stored, before).leg, stored.signatures(0, after, rng)
+        leg, healthy = Trained(network, stored, before).leg, stored.signatures(0, after, rng)[KNOWN:]
         begins, last = rng.integers(len(healthy) - BLOCK, size=each // BLOCK + 3), NONE
         order = (begins[:, None] + np.arange(BLOCK)).ravel()
         total = np.vstack([np.zeros(160), np.cumsum(healthy[order], axis=0)])

@@ -3,7 +3,7 @@
 Each leg is one small file: the drive torque (cycles, 512) [N m] of the leg when new, and after changes of it.
 The simulation is slow and knows no drive: `signals.py` adds drives to the stored torque, many times.
 
-`python legs.py DIRECTORY [--test] [--first 0] [--number 5000] [--every 1]` makes the legs that are missing.
+`python legs.py DIRECTORY [--test] [--first 0] [--number 5000]` makes the legs that are missing.
 """
 
 import argparse
@@ -63,9 +63,7 @@ def drawn(seed: int, is_test: bool) -> Drawn:
     wide = 0.5 if is_test else 1.0
     bodies = len(BODIES)
     mass, length = 1.0 + wide * rng.uniform(-0.1, 0.1, bodies), 1.0 + wide * rng.uniform(-0.01, 0.01, bodies)
-    friction = np.exp(
-        rng.uniform(np.log(0.5), np.log(2.0)) if is_test else rng.uniform(np.log(0.4), np.log(2.5))
-    )
+    friction = np.exp(rng.uniform(*np.log((0.5, 2.0) if is_test else (0.4, 2.5))))
     rpm = 60.0 if is_test else rng.uniform(50.0, 70.0)
     # waves of the speed in a turn
     size = rng.uniform(0.0, 0.03 if is_test else 0.05) * rng.dirichlet([1.0, 3.0, 1.0])
@@ -76,9 +74,8 @@ def drawn(seed: int, is_test: bool) -> Drawn:
     is_loaded = seed >= 100 if is_test else seed % 3 == 0
     ground, load = None, np.zeros((0, 2))
     if is_loaded:
-        peak_n = (
-            (100.0, 300.0, 600.0)[seed % 3] if is_test else np.exp(rng.uniform(np.log(50.0), np.log(600.0)))
-        )
+        peak_n = np.exp(rng.uniform(np.log(50.0), np.log(600.0)))
+        peak_n = (100.0, 300.0, 600.0)[seed % 3] if is_test else peak_n
         ground = LoadConfig(ground_n=peak_n, shape="treadmill" if is_test else "template")
         load = np.zeros((1, 2)) if is_test else _load(rng, peak_n)
     parameters = LegParameters(mass, length, float(friction), load=load)
@@ -221,13 +218,9 @@ def main() -> None:
     parser.add_argument("--test", action="store_true", help="test legs, in full coordinates")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--number", type=int, default=5000)
-    parser.add_argument("--every", type=int, default=1, help="only each n-th leg, for several processes")
-    parser.add_argument("--load", type=float, default=1e9, help="wait while the machine's load is above")
     options = parser.parse_args()
-    for seed in range(options.first, options.first + options.number, options.every):
+    for seed in range(options.first, options.first + options.number):
         path = options.directory / f"{seed:05d}.npz"
-        while os.getloadavg()[0] > options.load:
-            time.sleep(5.0)
         if path.exists():
             continue
         began, leg = time.process_time(), drawn(seed, options.test)

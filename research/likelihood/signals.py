@@ -1,8 +1,7 @@
 """Drives and torque sensors on stored legs, and the signatures that they show.
 
 A signature has 160 entries: the mean torque in 80 phases over the torque's size, and the logarithm of the
-roughness over this size. `python signals.py LEGS FILE [--draws 12]` draws drives on all training legs
-that the file does not have yet.
+roughness over this size. `python signals.py LEGS FILE [--draws 10]` draws drives on all training legs.
 """
 
 import argparse
@@ -22,7 +21,6 @@ from leg_wear_monitor.twin.reference import POINTS, CrankProfile
 PHASES = 80
 CLOCK = 1.0021  # true over nominal period of the sensor: its samples drift through the gait cycle
 RATE_HZ = 200.0
-MOST_CYCLES = 7  # in a mean
 LINKAGE = build_linkage(LEG)
 
 
@@ -198,13 +196,8 @@ def unified(rows: np.ndarray, size_nm: float) -> np.ndarray:
 
 def changes_of(truth: dict[str, Any]) -> np.ndarray:
     """Change in each state (states, 14): logarithms of five clearances, seven masses, friction and load."""
-    parts = (
-        truth["clearance_m"],
-        truth["state_mass"],
-        truth["state_friction"][:, None],
-        truth["state_load"][:, None],
-    )
-    logs = np.log(np.hstack(parts))
+    names = ("clearance_m", "state_mass", "state_friction", "state_load")
+    logs = np.log(np.column_stack([truth[name] for name in names]))
     return np.asarray(logs - logs[0])
 
 
@@ -214,57 +207,41 @@ def examples(stored: Stored, draws: int, rng: np.random.Generator) -> dict[str, 
     change = np.vstack([change[1:], change[:1]])
     base, present, counts, within = [], [], [], []
     for _ in range(draws):
-        drive = drawn_drive(rng, stored.size_nm)
-        new = stored.signatures(0, drive, rng)
-        order = rng.permutation(len(new))
-        first = int(rng.integers(6, 11))
-        base.append(new[order[:first]].mean(axis=0))
-        rows, numbers = [], []
-        for state in range(1, len(change) + 1):
-            later = drifted(drive, rng, stored.size_nm)
-            if state < len(change):
-                cycles = stored.signatures(state, later, rng)
-                within.append(cycles[1] - cycles[0])
-                there = rng.permutation(len(cycles))
-            else:  # unchanged: the gait cycles that are not in the baseline
-                cycles, there = stored.signatures(0, later, rng), order[first:]
-            n = min(
-                int(np.ceil(MOST_CYCLES ** rng.random())) if rng.random() < 0.7 else MOST_CYCLES, len(there)
-            )
-            rows.append(cycles[there[:n]].mean(axis=0))
-            numbers.append((n, first))
-        present.append(rows)
-        counts.append(numbers)
-    return {
-        "base": np.array(base, np.float32),
-        "present": np.array(present, np.float32),
-        "counts": np.array(counts, np.float32),
-        "within": np.array(within, np.float32)[:: max(1, draws // 2)],
-        "change": change.astype(np.float32),
-        "context": stored.context.astype(np.float32),
-        "peak_n": np.float32(stored.truth["peak_n"]),
+        drive, first = drawn_drive(rng, stored.size_nm), int(rng.integers(6, 11))
+        new = rng.permutation(len(stored.torque(0)))
+        base.append(stored.signatures(0, drive, rng)[new[:first]].mean(axis=0))
+        for state in [*range(1, len(change)), 0]:
+            cycles = stored.signatures(state, drifted(drive, rng, stored.size_nm), rng)
+            # of the unchanged leg, those that are not in the baseline
+            there = rng.permutation(len(cycles)) if state else new[first:]
+            n = int(rng.integers(1, len(there) + 1))
+            present.append(cycles[there[:n]].mean(axis=0))
+            counts.append((n, first))
+        within.append(cycles[1] - cycles[0])
+    found = {
+        "base": base,
+        "present": np.reshape(present, (draws, -1, 160)),
+        "within": within,
+        "change": change,
     }
+    found |= {"counts": np.reshape(counts, (draws, -1, 2)), "context": stored.context}
+    found["peak_n"] = stored.truth["peak_n"]
+    return {name: np.asarray(one, np.float32) for name, one in found.items()}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("legs", type=Path)
     parser.add_argument("file", type=Path)
-    parser.add_argument("--draws", type=int, default=12)
+    parser.add_argument("--draws", type=int, default=10)
     options = parser.parse_args()
-    known: dict[str, np.ndarray] = {}
-    if options.file.exists():
-        with np.load(options.file) as file:
-            known = {name: file[name] for name in file.files}
-    seeds, found = known.pop("seed", np.zeros(0, int)).tolist(), []
-    for path in sorted(options.legs.glob("[0-9]????.npz")):
-        if int(path.stem) not in seeds:
-            seeds.append(int(path.stem))
-            found.append(examples(Stored.read(path), options.draws, np.random.default_rng([seeds[-1], 9])))
-    new = {key: np.array([one[key] for one in found]) for key in found[0]}
-    np.savez(
-        options.file, seed=seeds, **{k: np.concatenate([known.get(k, v[:0]), v]) for k, v in new.items()}
-    )
+    paths = sorted(options.legs.glob("[0-9]????.npz"))
+    seeds = [int(path.stem) for path in paths]
+    found = [
+        examples(Stored.read(path), options.draws, np.random.default_rng([seed, 9]))
+        for seed, path in zip(seeds, paths, strict=True)
+    ]
+    np.savez(options.file, seed=seeds, **{name: np.array([one[name] for one in found]) for name in found[0]})
     print(f"{len(seeds)} legs")
 
 

@@ -227,7 +227,7 @@ def today(legs: list[Stored], names: list[str], longest: int, counts: Counts) ->
             one.warm_up()
             for seen in observed(one, LEG, stream(stored, 0, before, longest, 0), 0):
                 cycle += 1
-                if not seen.reason:
+                if one.state.commissioned is not None and not seen.reason:
                     break
             seconds, load_n = time.process_time() - began, seen.load.peak_n if seen.load else 0.0
             print(f"{name}: {cycle} cycles, {seconds:.0f} s, load {load_n:.0f} N, {seen.reason or 'sure'}")

@@ -36,7 +36,9 @@ _LEAST_POINTS = 3  # least number of phases with samples, per harmonic
 
 _MOST_CAUSES = 3
 _SCALE_SIGMA = 0.001  # without a cause, the factor is the declared one
-_ANY, _ANY_LOAD_N = 10.0, 1.0e4  # wide priors of factor and mass, and of the load
+_ANY, _ANY_LOAD_N = 10.0, 1.0e4  # wide priors of the factor and of the load
+# prior of a body's mass, as a fraction of it: a tool or a cover, rarely as heavy as the body itself
+_MASS_SIGMA = 0.5
 _MODEL_ERROR = 0.02  # fraction of the predicted RMS that even the right causes leave
 _MASS_RANGE = (-0.9, 4.0)  # possible error of a body's mass, as a fraction of it
 # bodies whose double mass changes the torque by a smaller fraction of its RMS are not supposed as causes
@@ -237,7 +239,7 @@ def _fit(curves: _Curves, causes: _Causes, lag_rad: float, allowed: Allowed) -> 
         [
             _ANY if causes.is_scaled else _SCALE_SIGMA,
             _ANY_LOAD_N if causes.is_loaded else max(reach_n, 1.0e-6),
-            _ANY,
+            _MASS_SIGMA,
         ]
     )
     weight = np.square(allowed.unexplained * curves.size_nm / sigma) / len(body)
@@ -246,7 +248,7 @@ def _fit(curves: _Curves, causes: _Causes, lag_rad: float, allowed: Allowed) -> 
     )
     factor, load_n, mass = values[0], values[1] / values[0], values[2] / values[0]
     rest = np.sqrt(np.square(measured - values.T @ columns).sum(axis=1)) / (np.abs(factor) * curves.size_nm)
-    narrow = np.array([not causes.is_scaled, not causes.is_loaded, False])
+    narrow = np.array([not causes.is_scaled, not causes.is_loaded, True])
     beyond = np.square((values - mean[:, None]) / sigma[:, None])[narrow].sum(axis=0)
     unlikely = 0.5 * len(body) * np.log(rest**2 + _MODEL_ERROR**2) + 0.5 * beyond
     is_possible = (factor * causes.sign > 0.0) & (mass > _MASS_RANGE[0]) & (mass < _MASS_RANGE[1])

@@ -252,7 +252,7 @@ def test_a_repair_and_a_measurement_show_at_the_next_update(run, fleet, tmp_path
         ("legs: []", "legs: is empty. Expected at least one leg"),
         ("legs: [{id: a, recordings: x, lot: y}]", "legs.a.lot: unknown key"),
         ("legs: [{id: a/b, recordings: x}]", "legs.a/b.id: 'a/b' is not a name for a directory"),
-        ("legs: [{id: a, recordings: '*.mcap'}, {id: A, recordings: x}]", "legs: the id A is given twice"),
+        ("legs: [{id: a, recordings: '*.mcap'}, {id: A, recordings: x}]", "legs: the id A occurs twice"),
         ("legs: [{id: a, recordings: '*.mcap'}, {id: b, recordings: x.mcap}]", "x.mcap is a recording of"),
         ("legs: [{id: a, recordings: x.mcap, config: none.yaml}]", "none.yaml: "),
     ],

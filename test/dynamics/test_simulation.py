@@ -149,7 +149,7 @@ def test_a_part_of_an_ideal_cycle_is_counted_as_such(leg, linkage_of):
 
 def test_an_energy_that_does_not_close_is_reported(leg):
     """With clearances of a third of the radius; not with one cycle, which has no standard error."""
-    with pytest.warns(ConfigWarning, match=r"bionic_leg.yaml: the energy does not close, .*--model full"):
+    with pytest.warns(ConfigWarning, match=r"the energy balance does not close: .*--model full"):
         simulate(leg, clearance_m=3.0e-3, cycles=6)
     simulate(leg, clearance_m=3.0e-3, cycles=1)
 

@@ -128,7 +128,7 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
 
 
 def test_a_measurement_says_in_words_what_it_taught():
-    assert "it adds little" in found(worn(2e-7), 0.302).words[0]
+    assert "adds little" in found(worn(2e-7), 0.302).words[0]
     result = found(worn(6e-5), 0.42)
     assert not result.contradicts
     assert result.measurement.counts
@@ -154,7 +154,7 @@ def test_a_contradiction_is_said_and_kept_but_does_not_count():
 def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
     """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
     result = found(worn(5e-11), 0.63, accept=True)
-    assert "that is 6.6e-09 1/Pa, usual are below 1e-09 1/Pa" in result.words[-1]
+    assert "that is 6.6e-09 1/Pa, usually below 1e-09 1/Pa" in result.words[-1]
     shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
     assert result.words[-1] in attrs.evolve(shown, limit_m=1e-3).lines
     assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]

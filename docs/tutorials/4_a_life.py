@@ -87,7 +87,7 @@ after = hours_left(monitor.renew_forecast().joints[0].forecast)
 print("remaining life: p10 {:.0f} h, p50 {:.0f} h, p90 {:.0f} h".format(*after))
 
 # %%
-# One measurement says more than the counting: this leg wears faster than a nominal one, its life is shorter, and the range is less than a third as wide.
+# One measurement says more than the counting: this leg wears faster than a nominal one, its life is shorter, and the range is less than half as wide.
 #
 # On a robot the monitor keeps its wear in a ledger, and the terminal takes the measurement: ``leg-wear-monitor measure A 0.325 --sigma 0.002 --config monitor.yaml --ledger wear.ledger``.
 #

@@ -47,12 +47,21 @@ plt.show()
 # The recording has only ten gait cycles, in which nothing wears measurably.
 # So for this lesson the monitor counts 100 000 times the wear: each recorded cycle stands for 100 000 cycles.
 # (On a robot the factor is 1, and with this one the alarms of impact forces mean nothing.)
+#
+# You measured joint A when it was new: 0.300 mm with a standard deviation of 0.002 mm.
+# Without this, a new clearance is known to 10 %, and a later measurement says little about the wear.
 
 factor = 100_000
 bags = lw.share_directory() / "bags"
 config = attrs.evolve(lw.load_config(bags / "healthy.yaml"), wear_acceleration=factor)
 
-replayed = lw.replay(bags / "healthy.mcap", config)
+
+def measured_when_new(monitor):
+    """Enter the measurement before the first gait cycle."""
+    monitor.measure("A", clearance_m=0.0003, sigma_m=2e-6, stamp_ns=1, who="you")
+
+
+replayed = lw.replay(bags / "healthy.mcap", config, ready=measured_when_new)
 monitor, counted = replayed.monitor, replayed.summary()
 
 walked = factor * counted.cycles
@@ -87,7 +96,7 @@ after = hours_left(monitor.renew_forecast().joints[0].forecast)
 print("remaining life: p10 {:.0f} h, p50 {:.0f} h, p90 {:.0f} h".format(*after))
 
 # %%
-# One measurement says more than the counting: this leg wears faster than a nominal one, its life is shorter, and the range is less than half as wide.
+# One measurement says more than the counting: this leg wears faster than a nominal one, its life is shorter, and the range is less than a third as wide.
 #
 # On a robot the monitor keeps its wear in a ledger, and the terminal takes the measurement: ``leg-wear-monitor measure A 0.325 --sigma 0.002 --config monitor.yaml --ledger wear.ledger``.
 #

@@ -82,8 +82,6 @@ class JointMotion:
         True if the encoder's readings are wrapped to a turn.
     noise_rad : float
         Standard deviation of the readings about the smoothed position [rad].
-    first_rad : (recordings,) array
-        First reading of each recording that has enough samples to be smoothed [rad].
     rate_hz : float
         Usual sampling rate of the encoder.
     """
@@ -96,7 +94,6 @@ class JointMotion:
     near: NDArray[np.bool_]
     is_wrapped: bool
     noise_rad: float
-    first_rad: Floats
     rate_hz: float
 
 
@@ -124,13 +121,13 @@ def motion_of(joint: Series) -> JointMotion:
 
     Each recording is smoothed by itself; one that is too short is left out.
     """
-    parts = []  # per recording: its index, its first reading, and the six results of `_smoothed`
+    parts = []  # per recording: its index, and the six results of `_smoothed`
     for index in _long_enough(joint):
         chosen = joint.recording == index
         value = _unwrapped_values(joint.value[chosen])
-        parts.append((index, value[0], *_smoothed(joint.time_s[chosen], value)))
-    columns = [np.concatenate([part[i] for part in parts]) for i in range(2, 7)]
-    number = np.concatenate([np.full(len(part[2]), part[0]) for part in parts])
+        parts.append((index, *_smoothed(joint.time_s[chosen], value)))
+    columns = [np.concatenate([part[i] for part in parts]) for i in range(1, 6)]
+    number = np.concatenate([np.full(len(part[1]), part[0]) for part in parts])
     return JointMotion(
         time_s=columns[0],
         position_rad=columns[1],
@@ -139,8 +136,7 @@ def motion_of(joint: Series) -> JointMotion:
         recording=number,
         near=columns[4],
         is_wrapped=is_wrapped(joint.value),
-        noise_rad=float(np.median([part[7] for part in parts])),
-        first_rad=np.array([part[1] for part in parts]),
+        noise_rad=float(np.median([part[6] for part in parts])),
         rate_hz=float(1.0 / np.median(np.diff(joint.time_s))),
     )
 

@@ -274,9 +274,6 @@ class MismatchWindow:
 # Checks of the measured torque for an impossible bias, drift or lag: bounds, values, causes.
 
 
-# fractions of the predicted torque's RMS, if the parameters are 0: joints and gears lose some tenths of the
-# transmitted torque; a tenth is also the limit of the torque residual
-MAX_FRICTION = 0.3  # of the RMS of the predicted torque: a larger constant torque is a bias
 _SURE = 3.0  # standard deviations
 
 

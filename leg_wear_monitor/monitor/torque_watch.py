@@ -21,7 +21,6 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import (
-    MAX_FRICTION,
     MismatchWindow,
     TorqueRecord,
     torque_causes,
@@ -139,7 +138,7 @@ class TorqueWatch(Observer):
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
         """Torque residual, bias, drift and lag of a gait cycle, by the names of their alarms."""
-        values = torque_values(report, self.record, self._max_friction_nm)
+        values = torque_values(report, self.record, self._leg.twin.max_friction_nm)
         if self._leg.config.cadence.allows(report.cadence_rpm):
             values[MISMATCH.kind] = report.torque_mismatch
         return {spec.name(): spec.value(values) for spec in TORQUE}
@@ -308,17 +307,13 @@ class TorqueWatch(Observer):
         return None if explained and self.diagnosis.replaces(explained) else explained
 
     @property
-    def _max_friction_nm(self) -> float:
-        return MAX_FRICTION * float(self._leg.twin.torque_size_nm)
-
-    @property
     def _allowed(self) -> Allowed:
         """Which torque a leg without a fault may have."""
         config = self._leg.config
         return Allowed(
             lag_s=largest_lag_s(config),
             loads_n=LOADS_N,
-            friction_nm=self._max_friction_nm,
+            friction_nm=self._leg.twin.max_friction_nm,
             unexplained=WARN_FRACTION * config.limits.torque_mismatch,
         )
 
@@ -328,7 +323,7 @@ class TorqueWatch(Observer):
         alarms, last = self._board.alarms, self._leg.last
         names = {spec.name() for spec in TORQUE}
         present = {name for name in names if alarms[name].present is not Level.OK}
-        return torque_causes(present, last, self.record, self._max_friction_nm) if last else {}
+        return torque_causes(present, last, self.record, self._leg.twin.max_friction_nm) if last else {}
 
     @property
     def leg_fields(self) -> Mapping[str, Any]:

@@ -68,7 +68,7 @@ _CUTOFF = TURN * 10.0  # rad/s: of the low-pass filter of measured and predicted
 _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
-_LARGEST_FRICTION = 0.3  # constant one, of the RMS torque: as drive_torque.max_friction_nm by default
+_MAX_FRICTION = 0.3  # of the RMS torque: joints and gears lose some tenths; a larger constant is a bias
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -108,6 +108,8 @@ class DigitalTwin:
         Foot load, friction and lag by the drive torque.
     torque_size_nm : float
         RMS of the ideal drive torque at the commanded speed.
+    max_friction_nm : float
+        Largest constant torque that counts as friction.
 
     Raises
     ------
@@ -146,6 +148,7 @@ class DigitalTwin:
         self._statistics = run.new_run_statistics(len(setup.linkage.mechanism.joints))
         self._shape_torque = 0.0 if is_measured else shape_torque(setup.linkage)
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
+        self.max_friction_nm = _MAX_FRICTION * self.torque_size_nm
         self._instants = settings.torque_sampling == INSTANT
         kept = (
             (cycle.INSTANT_CYCLES, cycle.INSTANT_CYCLES)
@@ -513,8 +516,7 @@ class DigitalTwin:
     def _set_friction(self) -> None:
         """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
         constant, under_load = self.estimate.values[[follower_state.FRICTION, follower_state.LOAD_FRICTION]]
-        most_nm = _LARGEST_FRICTION * self.torque_size_nm
-        self._sensor["friction"] = min(max(float(constant), 0.0), most_nm)
+        self._sensor["friction"] = min(max(float(constant), 0.0), self.max_friction_nm)
         self._sensor["load_friction"] = under_load
 
     def _by_phase(self, profile: TorqueProfile, acting_n: float, step_nm: Floats) -> Floats:

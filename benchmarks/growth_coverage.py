@@ -29,8 +29,7 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
-from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, ModelError, growth_rate, model_error
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import gait_samples
 

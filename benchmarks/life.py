@@ -18,9 +18,9 @@ from leg_wear_monitor.life.jumps import JumpControl
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast, left_over
-from leg_wear_monitor.monitor.forecast.forecaster import law_of, read_lives
+from leg_wear_monitor.monitor.config.settings import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.growth import law_of, left_over, read_lives
 from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
 
 HASTE = 500.0

@@ -25,16 +25,15 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import (
     Forecast,
-    GrowthLaw,
     JointCondition,
     JointForecast,
     LegForecast,
     forecast,
 )
-from leg_wear_monitor.monitor.forecast.forecaster import law_of
+from leg_wear_monitor.monitor.forecast.growth import GrowthLaw, law_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 LIMIT_M = 6.0e-4

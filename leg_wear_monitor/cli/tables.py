@@ -13,9 +13,8 @@ from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
 from leg_wear_monitor.monitor.alarms import ADVICE, duration, raised_values, time_words
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
 from leg_wear_monitor.monitor.ledger.entry import walked_words
-from leg_wear_monitor.monitor.verdict.decision import decision_of
 from leg_wear_monitor.monitor.verdict.situation import SOURCES
-from leg_wear_monitor.monitor.verdict.verdict import guide_to
+from leg_wear_monitor.monitor.verdict.verdict import decision_of, guide_to
 from leg_wear_monitor.state import as_plain
 
 if TYPE_CHECKING:

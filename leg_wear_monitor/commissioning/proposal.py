@@ -26,8 +26,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH
-from leg_wear_monitor.monitor.config.sections import drive_figures
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
 
 # The chosen fit again, with the terms that the recording determines and the lag to allow for.
 

@@ -12,8 +12,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import Lost
-from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
-from leg_wear_monitor.monitor.verdict.verdict import guide_to
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
 from leg_wear_monitor.recordings.result import (
     ReplayGait,
     ReplayHistory,

@@ -17,7 +17,7 @@ from leg_wear_monitor.files import data_frame, json_text, write_whole
 from leg_wear_monitor.fleet.description import fleet_directory
 from leg_wear_monitor.fleet.recordings import read_lines
 from leg_wear_monitor.monitor.alarms import ADVICE, time_words
-from leg_wear_monitor.monitor.verdict.decision import how_soon
+from leg_wear_monitor.monitor.verdict.verdict import how_soon
 from leg_wear_monitor.state import JointClearance, LegState, LifeHours, State
 
 if TYPE_CHECKING:

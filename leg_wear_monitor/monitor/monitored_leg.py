@@ -49,8 +49,7 @@ from leg_wear_monitor.monitor.verdict.situation import (
     surely_at,
     surest,
 )
-from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
-from leg_wear_monitor.monitor.verdict.verdict import dated, has_changed, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, dated, has_changed, verdict_of
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Figure, JointClearance, LegAlarms, LegState, LifeHours, Verdict
 from leg_wear_monitor.twin.sample import NO_LOAD

@@ -12,9 +12,8 @@ from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState, 
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import TorqueRecord, offset_error_rad
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.verdict.causes import explanation, sentence
-from leg_wear_monitor.monitor.verdict.table import words_of_cause
-from leg_wear_monitor.monitor.verdict.verdict import with_unit
+from leg_wear_monitor.monitor.verdict.rules import explanation, sentence
+from leg_wear_monitor.monitor.verdict.verdict import with_unit, words_of_cause
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.statistics import NotCompared
 

@@ -15,10 +15,8 @@ from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
-from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, Forecaster, JointForecast
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, ModelError, growth_rate, model_error
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport

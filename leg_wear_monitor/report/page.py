@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import duration, time_words
-from leg_wear_monitor.monitor.verdict.decision import HOW_SURE, decision_of, figures_of
+from leg_wear_monitor.monitor.verdict.verdict import HOW_SURE, decision_of, figures_of
 from leg_wear_monitor.recordings.result import ReplaySummary
 from leg_wear_monitor.state import Figure, Level, State, Verdict
 

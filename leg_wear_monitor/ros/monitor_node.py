@@ -22,7 +22,7 @@ from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
+from leg_wear_monitor.monitor.forecast.growth import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports, Status

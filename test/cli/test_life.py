@@ -11,7 +11,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs.life import life_lines
 from leg_wear_monitor.life import life as many_lives
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.monitor.forecast.forecaster import read_lives
+from leg_wear_monitor.monitor.forecast.growth import read_lives
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--max-wear-per-jump-m", "5e-5")

@@ -19,9 +19,9 @@ from leg_wear_monitor.mechanism import materials, sourced, spec
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
-from leg_wear_monitor.monitor.ledger.rows import FORMAT, TABLES, create_tables
-from leg_wear_monitor.monitor.verdict.table import rules
-from leg_wear_monitor.monitor.verdict.table import table as verdict_table
+from leg_wear_monitor.monitor.ledger.file import FORMAT, TABLES, create_tables
+from leg_wear_monitor.monitor.verdict.verdict import rules
+from leg_wear_monitor.monitor.verdict.verdict import table as verdict_table
 from leg_wear_monitor.studies.study import Study, Sweep
 
 ROOT = Path(__file__).parents[2]

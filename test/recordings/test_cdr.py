@@ -8,8 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders, FootLoad
-from leg_wear_monitor.monitor.config.sections import DriveParameters
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.config.settings import DriveParameters, MonitorConfig
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.cdr import MESSAGE, Decoder
 from leg_wear_monitor.recordings.streams import (

@@ -18,7 +18,7 @@ from leg_wear_monitor.files import json_text, package_version, share_directory
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials import Material
     from leg_wear_monitor.mechanism.sourced import Drive, SourcedValue
-    from leg_wear_monitor.monitor.config.sections import DriveParameters
+    from leg_wear_monitor.monitor.config.settings import DriveParameters
 
 
 _Sourced = TypeVar("_Sourced", "Drive", "Material")
@@ -164,7 +164,7 @@ def _parameters(path: str, node: str | None = None) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
     from leg_wear_monitor.monitor.config.parameters import load_config
-    from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
+    from leg_wear_monitor.monitor.forecast.growth import life_doubts
 
     config = load_config(path, node)
     if node:
@@ -186,7 +186,7 @@ def _parameters(path: str, node: str | None = None) -> str:
 
 def _drive(parameters: "DriveParameters", path: str) -> str:
     """The declared values of the drive, on a separate line; empty if none is declared."""
-    from leg_wear_monitor.monitor.config.sections import drive_figures
+    from leg_wear_monitor.monitor.config.settings import drive_figures
 
     declared = drive_figures(parameters, path).declared
     if not (declared or parameters.type):

@@ -117,7 +117,7 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     from leg_wear_monitor.mechanism.plausible import doubts
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts
     from leg_wear_monitor.monitor.config.parameters import load_config
-    from leg_wear_monitor.monitor.forecast.forecaster import life_doubts
+    from leg_wear_monitor.monitor.forecast.growth import life_doubts
 
     config, source = load_config(path, node), str(path or "parameters")
     mechanism = load_mechanism(config.mechanism)

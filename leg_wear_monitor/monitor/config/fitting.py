@@ -12,8 +12,7 @@ from leg_wear_monitor.mechanism.plausible import limit_fault
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.inputs import INTERFACE, MAX_LAG_S
-from leg_wear_monitor.monitor.config.sections import drive_figures
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
 from leg_wear_monitor.twin import sample
 
 _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}

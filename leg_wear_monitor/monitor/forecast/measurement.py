@@ -11,7 +11,7 @@ from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
 from leg_wear_monitor.mechanism.spec import Clearance
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
-from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientEstimate,

@@ -25,7 +25,7 @@ from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
-from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.ledger.entry import (
     CoefficientSpan,
     CorrectedClearance,

@@ -18,7 +18,6 @@ from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
     Binding,
@@ -39,10 +38,16 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import (
     LedgerError,
+    commissioned_torques,
     connect,
     copy_of,
     damage_refused,
+    read,
+    read_entry,
     transaction,
+    write_entry,
+    write_event,
+    write_run,
 )
 from leg_wear_monitor.state import Verdict
 
@@ -72,13 +77,13 @@ class LedgerContent:
     @classmethod
     def of(cls, db: sqlite3.Connection) -> "LedgerContent":
         """Read all of it."""
-        runs, verdicts = rows.read(db, Run), rows.read(db, VerdictEvent)
+        runs, verdicts = read(db, Run), read(db, VerdictEvent)
         return cls(
             runs=runs,
-            entry=rows.read_entry(db, runs),
+            entry=read_entry(db, runs),
             verdict=verdicts[-1].verdict if verdicts else None,
-            measurements=rows.read(db, Measurement),
-            audits=rows.read(db, Audit),
+            measurements=read(db, Measurement),
+            audits=read(db, Audit),
         )
 
     @property
@@ -180,13 +185,13 @@ class Ledger:
         self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
-        self.corrections: tuple[Recount, ...] = rows.read(db, CorrectedClearance)
+        self.corrections: tuple[Recount, ...] = read(db, CorrectedClearance)
         former = [audit.joint for audit in self.audits if audit.joint]
         self.states = (*former, *(self.entry.joints if self.entry else ()))
-        self.commissioned = next(reversed(rows.read(db, Commissioned)), None)
-        self.commissioned_torques = rows.commissioned_torques(rows.read(db, CommissionedTorque))
-        self.parameters = next(reversed(rows.read(db, IdentifiedLeg)), None)
-        self.references = [*reversed(rows.read(db, SimulatedReference))]
+        self.commissioned = next(reversed(read(db, Commissioned)), None)
+        self.commissioned_torques = commissioned_torques(read(db, CommissionedTorque))
+        self.parameters = next(reversed(read(db, IdentifiedLeg)), None)
+        self.references = [*reversed(read(db, SimulatedReference))]
 
     @property
     def waiting(self) -> int:
@@ -260,11 +265,11 @@ class Ledger:
             if _place(self.path) != self._place:
                 raise LedgerError("was moved away or replaced while in use; put it back")
             with transaction(self._db):
-                rows.write_run(self._db, run)
+                write_run(self._db, run)
                 if entry is not None:
-                    rows.write_entry(self._db, run.number, entry)
+                    write_entry(self._db, run.number, entry)
                 for event in self._events:
-                    rows.write_event(self._db, event)
+                    write_event(self._db, event)
         except (sqlite3.Error, LedgerError) as error:
             self.fault = one_line(error)
             return False

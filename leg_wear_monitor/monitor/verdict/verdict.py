@@ -1,12 +1,225 @@
-"""The verdict: state, joints, reason, action."""
+"""The verdict: its table in config/verdict.yaml, the worst of several findings, and advice for operators.
 
-from collections.abc import Iterable, Sequence
+The table has the sentences and columns of each rule, the words of each cause, and measured accuracies.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms import amount, guide_of
-from leg_wear_monitor.monitor.verdict.table import NO_GAIT_CYCLE
-from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
+from leg_wear_monitor.configuration.strict import read_document, structure
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.files import share_directory
+from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS, amount, guide_of
+from leg_wear_monitor.monitor.input_health import INPUT_RULES
+from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
+from leg_wear_monitor.twin import CRANK, TORQUE
+
+TABLE_FILE = "config/verdict.yaml"
+ALARM, NONE, NO_GAIT_CYCLE = "ALARM", "NONE", "NO_GAIT_CYCLE"
+_OF_INPUT = {"INPUT_CRANK": CRANK, "INPUT_TORQUE": TORQUE}
+_HUNDRED = 100
+
+
+@attrs.frozen(kw_only=True)
+class Rule:
+    """A rule; the sentences have words of its cases in braces.
+
+    Attributes
+    ----------
+    state : State
+    why, do : str
+        In ``do``, ``{joints}`` names all joints of the cases with their labels, and ``{joint}`` is the first
+        one as commands take it.
+    not_valid : tuple of Figure
+        Kinds of values that are not valid while the rule applies.
+    rests_on : str
+        Kind of the samples that show it. A case that began after a fault of these samples does not count.
+    advice : str
+        Its row of `VerdictTable.advice`.
+    soon, sure : str
+        Instead of those of the advice.
+    measured : tuple of str
+        Names of the measured values that say how often it is right.
+    """
+
+    state: State
+    why: str = ""
+    do: str = ""
+    not_valid: tuple[Figure, ...] = ()
+    rests_on: str = ""
+    advice: str
+    soon: str = ""
+    sure: str = ""
+    measured: tuple[str, ...] = ()
+
+
+@attrs.frozen(kw_only=True)
+class Advice:
+    """Columns that several rules share.
+
+    Attributes
+    ----------
+    if_wrong : str
+        Cost of following a false verdict, and of ignoring a true one.
+    check : str
+        The one check that settles it.
+    soon : str
+        How soon to act; empty if only the state decides.
+    sure : str
+        How sure the verdict is without a measured value, a key of `VerdictTable.how_sure`.
+    """
+
+    if_wrong: str
+    check: str
+    soon: str = ""
+    sure: str = "not_measured"
+
+
+@attrs.frozen(kw_only=True)
+class CauseWords:
+    """Words of a cause of a deviating drive torque.
+
+    Attributes
+    ----------
+    name, unit : str
+        Of its value, as evidence.
+    why : str
+        The sentence; the drive torque is *it*. ``{value}`` and ``{size}`` are the value with and without its
+        sign, ``{percent}`` is the size in percent, ``{subject}`` the body, ``{way}`` one of `ways`.
+    do : str
+        Action of the operator.
+    ways : tuple of str
+        Words for a negative and for a positive value.
+    """
+
+    name: str
+    unit: str = ""
+    why: str
+    do: str
+    ways: tuple[str, ...] = ("fallen", "risen")
+
+
+@attrs.frozen(kw_only=True)
+class MeasuredFigure:
+    """How often a verdict was right in cases with a known truth, and the conditions of these cases.
+
+    Attributes
+    ----------
+    right : float
+        Number of right cases; without `of`, a value for itself.
+    of : int or None
+        Number of cases.
+    words : str
+        Sentence part after the number of cases.
+    where : str
+        Details of the cases.
+    source : str
+        Page with all results, below the share directory.
+    date : str
+        Date of the measurement.
+    on_ground : bool or None
+        True if the legs walked on the ground, False in the air; None if it makes no difference.
+    needs_sure_names : bool
+        True if the cases had a model that fits the leg, so that the names of joints were sure.
+    needs_diagnosis : bool
+        True if the drive torque showed the modelled clearances before the case.
+    by : str or None
+        Source of the joint's clearance in these cases; None for any source.
+    """
+
+    right: float
+    of: int | None = None
+    words: str
+    where: str
+    source: str
+    date: str
+    on_ground: bool | None = None
+    needs_sure_names: bool = False
+    needs_diagnosis: bool = False
+    by: str | None = None
+
+    @property
+    def counted(self) -> str:
+        """Such as ``577 of 580``."""
+        return f"{self.right:g}" if self.of is None else f"{self.right:g} of {self.of}"
+
+    @property
+    def text(self) -> str:
+        """Such as ``99 of 100 such findings are right on simulated legs``."""
+        is_long = self.of is not None and self.of > _HUNDRED and self.right != self.of
+        counted = f"{int(_HUNDRED * self.right / (self.of or 1))} of {_HUNDRED}" if is_long else self.counted
+        return f"{counted} {self.words}"
+
+
+@attrs.frozen(kw_only=True)
+class VerdictTable:
+    """The file.
+
+    Attributes
+    ----------
+    phrases : dict of str to str
+        Parts of the sentences in ``do``, which have their names in braces.
+    how_soon : dict of str to str
+        How soon to act, by state.
+    how_sure : dict of str to str
+    advice : dict of str to Advice
+    rules : dict of str to Rule
+        By code, in the order of precedence among equal states.
+    causes : dict of str to CauseWords
+        By the name of the cause.
+    measured : dict of str to MeasuredFigure
+    """
+
+    phrases: dict[str, str]
+    how_soon: dict[str, str]
+    how_sure: dict[str, str]
+    advice: dict[str, Advice]
+    rules: dict[str, Rule]
+    causes: dict[str, CauseWords]
+    measured: dict[str, MeasuredFigure]
+
+
+@cache
+def table() -> VerdictTable:
+    """The content of the file.
+
+    Raises
+    ------
+    ConfigError
+        If the file is damaged.
+    """
+    return structure(read_document(share_directory() / TABLE_FILE, TABLE_FILE), VerdictTable, TABLE_FILE, "")
+
+
+@cache
+def rules() -> Mapping[str, Rule]:
+    """The rules by code; the faults of a stream of the input have the row of their stream."""
+    found: dict[str, Rule] = {}
+    for code, rule in table().rules.items():
+        if code in _OF_INPUT:
+            own = [one for one in INPUT_RULES if one.kind == _OF_INPUT[code]]
+            found |= {one.code: attrs.evolve(rule, why=one.why, do=one.do) for one in own}
+        else:
+            why = rule.why.replace("{fault}", FOOT_LOAD_WORDS.get(code.lower(), ""))
+            found[code] = attrs.evolve(rule, why=why, do=_with_phrases(rule.do))
+    return found
+
+
+def _with_phrases(text: str) -> str:
+    for name, phrase in reversed(table().phrases.items()):  # a phrase may contain earlier ones
+        text = text.replace(f"{{{name}}}", phrase)
+    return text
+
+
+def words_of_cause(cause: Cause) -> CauseWords:
+    """Words of a cause other than a clearance."""
+    return table().causes[cause.name]
+
+
+# Findings of the rules, and their verdict.
+
 
 _TIMING = "TORQUE_TIMING"
 
@@ -81,3 +294,56 @@ def with_unit(name: str, unit: str) -> str:
 def estimate(value: float, sigma: float, unit: str) -> str:
     """A value [SI] and its standard deviation, such as ``0.62 mm ± 0.03 mm``."""
     return f"{amount(value, unit)} ± {amount(sigma, unit)}"
+
+
+# How soon to act, how sure the verdict is, the check that settles it, and the cost of an error.
+#
+# Nothing here is stored: it follows from the code and the state of the verdict.
+
+
+HOW_SURE = "How sure"
+
+
+def _rule(state: LegState) -> Rule:
+    return rules().get(code_of_rule(state.verdict), rules()[ALARM])  # an older ledger may have other codes
+
+
+def _holds_for(figure: MeasuredFigure, state: LegState) -> bool:
+    """True if a leg meets the conditions of the cases in which an accuracy was measured."""
+    joint = state.clearances.get(state.verdict.joints[0]) if state.verdict.joints else None
+    return (
+        figure.on_ground in (None, bool(state.load.peak_n))
+        and not (figure.needs_sure_names and state.diagnosis.reason)
+        and not (figure.needs_diagnosis and state.diagnosis.state != "as_modelled")
+        and (figure.by is None or (joint is not None and figure.by == joint.best_estimate_source))
+    )
+
+
+def figures_of(state: LegState) -> tuple[MeasuredFigure, ...]:
+    """The measured values that say how often such a verdict is right on a leg like this; may be empty."""
+    figures = (table().measured[name] for name in _rule(state).measured)
+    return tuple(figure for figure in figures if _holds_for(figure, state))
+
+
+def how_soon(state: LegState) -> str:
+    """How soon to act on the verdict of a leg."""
+    rule, known = _rule(state), table()
+    return rule.soon or known.advice[rule.advice].soon or known.how_soon[state.verdict.state.value]
+
+
+def how_sure(state: LegState) -> str:
+    """How often such a verdict is right; says so if nothing was measured on a leg like this."""
+    rule, known = _rule(state), table()
+    measured = "; ".join(figure.text for figure in figures_of(state))
+    return measured or known.how_sure[rule.sure or known.advice[rule.advice].sure]
+
+
+def decision_of(state: LegState) -> list[tuple[str, str]]:
+    """The verdict of a leg as lines for operators, each with its title."""
+    advice = table().advice[_rule(state).advice]
+    return [
+        ("How soon", how_soon(state)),
+        (HOW_SURE, how_sure(state)),
+        ("Check", advice.check),
+        ("If wrong", advice.if_wrong),
+    ]

@@ -7,9 +7,8 @@ import attrs
 from leg_wear_monitor.files import or_nan, share_directory
 from leg_wear_monitor.monitor.alarm_specs import KINDS, QUANTITIES
 from leg_wear_monitor.monitor.alarms import amount, duration, joint_of, raised_values, time_words
-from leg_wear_monitor.monitor.verdict.decision import figures_of, how_sure
 from leg_wear_monitor.monitor.verdict.situation import COUNTED
-from leg_wear_monitor.monitor.verdict.verdict import guide_to
+from leg_wear_monitor.monitor.verdict.verdict import figures_of, guide_to, how_sure
 from leg_wear_monitor.recordings.result import (
     ReplayGait,
     ReplayRecording,

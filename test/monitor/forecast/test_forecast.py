@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
-from leg_wear_monitor.monitor.config.sections import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Answer, GrowthLaw, JointCondition, forecast, no_law
+from leg_wear_monitor.monitor.config.settings import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.growth import GrowthLaw, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 SETTINGS = Forecasting(model_sigma=0.05)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.forecast.forecast import GrowthLaw, SimulatedLife, cycles_to, fitted_law, no_law
+from leg_wear_monitor.monitor.forecast.growth import GrowthLaw, SimulatedLife, cycles_to, fitted_law, no_law
 
 FRESH = np.array([3e-4, 2e-4, 3e-4])
 LIMIT = np.array([6e-4, 3e-4, 5e-4])

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, with_ground_reaction, with_person
-from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
+from leg_wear_monitor.monitor.forecast.growth import ModelError, model_error
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
 
 

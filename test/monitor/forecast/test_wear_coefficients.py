@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
-from leg_wear_monitor.monitor.config.sections import Forecasting
+from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.measurement import measure
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,

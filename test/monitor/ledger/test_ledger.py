@@ -18,7 +18,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.ledger import rows
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
@@ -34,9 +33,8 @@ from leg_wear_monitor.monitor.ledger.entry import (
     VerdictEvent,
     binding_of,
 )
-from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.file import FORMAT, LedgerError, read
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.rows import FORMAT
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
@@ -387,9 +385,9 @@ EVENTS = [
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: type(event).__name__)
 def test_an_event_is_read_to_the_bit_as_it_was_noted(reopened, event):
-    (found,) = rows.read(reopened(event)._db, type(event))
-    given, read = (attrs.asdict(each) | {"id": 0} for each in (event, found))
-    np.testing.assert_equal(read, given)
+    (found,) = read(reopened(event)._db, type(event))
+    given, stored = (attrs.asdict(each) | {"id": 0} for each in (event, found))
+    np.testing.assert_equal(stored, given)
 
 
 def test_spans_are_kept_by_epochs_of_the_clock(open_ledger, entry_at):

@@ -3,12 +3,13 @@
 import attrs
 import pytest
 
-from leg_wear_monitor.monitor.verdict.decision import (
+from leg_wear_monitor.monitor.verdict.verdict import (
     HOW_SURE,
     decision_of,
     figures_of,
+    rules,
+    table,
 )
-from leg_wear_monitor.monitor.verdict.table import rules, table
 from leg_wear_monitor.state import FootLoad, JointClearance, LegState, State, TorqueDiagnosis, Verdict
 
 

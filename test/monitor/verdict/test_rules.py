@@ -25,11 +25,9 @@ from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.input_health import INPUT_RULES, InputFault
-from leg_wear_monitor.monitor.verdict.causes import sentence
-from leg_wear_monitor.monitor.verdict.rules import CONDITIONS, findings
+from leg_wear_monitor.monitor.verdict.rules import CONDITIONS, findings, sentence
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance, Situation
-from leg_wear_monitor.monitor.verdict.table import rules
-from leg_wear_monitor.monitor.verdict.verdict import dated, guide_to, has_changed, verdict_of
+from leg_wear_monitor.monitor.verdict.verdict import dated, guide_to, has_changed, rules, verdict_of
 from leg_wear_monitor.state import Figure, Level, State, Verdict
 from leg_wear_monitor.twin import CRANK, TORQUE
 

@@ -8,10 +8,8 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.monitor.ledger.entry import Entry
 
-
-def contents(entry: Entry | None) -> object:
+def contents(entry: Any) -> object:
     """All of an entry, whatever the order of its joints and totals."""
     if entry is None:
         return None

@@ -6,8 +6,11 @@ import sys
 import warnings
 from pathlib import Path
 
+import command_line
 import pytest
 
+from leg_wear_monitor.cli import kernels
+from leg_wear_monitor.compiled import kernel
 from leg_wear_monitor.compiled.cache import code_directory, make_private
 from leg_wear_monitor.errors import ConfigWarning
 
@@ -86,3 +89,51 @@ def test_the_usual_place_is_taken_without_a_word(place):
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConfigWarning)
         assert code_directory("a leaf of this test") == place / "a leaf of this test"
+
+
+# --- the verb `cache` ---
+
+
+def test_it_prints_where_and_how_much(place):
+    old = place / "dynamics.full.model-0123456789abcdef"
+    old.mkdir(parents=True, mode=0o700)
+    (old / "code").write_bytes(bytes(2_300_000))
+    lines = command_line.run("cache").out.splitlines()
+    assert lines == [f"place: {place}", "total: 2.3 MB in 2 directories"]  # one is the verb's own
+
+
+def test_clear_removes_all_of_it_and_nothing_beside(place):
+    for name in ("dynamics.full.model-0123456789abcdef", "0123456789abcdef"):
+        (place / name / "deep").mkdir(parents=True)
+        (place / name / "deep" / "code").write_bytes(bytes(1_000_000))
+    (place.parent / "beside").write_text("")
+    (place / "link").symlink_to(place.parent)
+    result = command_line.run("cache", "--clear")
+    assert result.code == 0
+    assert result.out.splitlines()[1] == "removed: 2.0 MB in 3 directories"
+    assert [each.name for each in place.iterdir()] == ["link"]
+    assert (place.parent / "beside").exists()
+
+
+def test_nothing_is_removed_where_no_place_is_safe(monkeypatch):
+    monkeypatch.setattr(kernel, "cache_directory", lambda: None)
+    result = command_line.run("cache", "--clear")
+    assert result.code == 2
+    assert result.err == "error: no directory is safe for compiled code, so it is not stored\n"
+
+
+def test_a_fill_prints_the_place_and_the_size(place, monkeypatch):
+    monkeypatch.setattr(kernels, "_CALLS", {"nothing": int})
+    result = command_line.run("cache", "--fill")
+    assert result.code == 0
+    assert result.out.startswith(f"place: {place}\ntotal: ")
+    assert command_line.run("cache", "--fill", "--clear").code == 2
+
+
+@pytest.mark.slow
+def test_after_a_fill_nothing_is_compiled(place):
+    assert command_line.run("cache", "--fill").code == 0
+    line = "import leg_wear_monitor.cli.kernels as kernels; [call() for call in kernels._CALLS.values()]"
+    before = sorted(file for file in place.rglob("*.nbc"))
+    subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[1])
+    assert before and sorted(file for file in place.rglob("*.nbc")) == before

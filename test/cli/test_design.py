@@ -9,8 +9,8 @@ TRIED = ("--materials", "pai-on-steel-dry,brass-on-steel-dry", "--widths-mm", "5
 
 def test_each_joint_is_shown_as_it_is_and_with_the_smallest_that_lasts(run, tmp_path):
     result = run("design", "four_bar", "--duty", "0:8", *TRIED, "--hours", "10", "--json", "design.json")
-    assert result.exit_code == 0
-    lines = result.stdout.splitlines()
+    assert result.code == 0
+    lines = result.out.splitlines()
     for joint in ("B", "C"):
         (at,) = (i for i, line in enumerate(lines) if line.startswith(f"{joint} now "))
         assert lines[at + 1].split()[:4] == [joint, "pai-on-steel-dry", "10", "5"]

@@ -28,33 +28,33 @@ def evil(shipped, tmp_path):
 
 def test_a_page_of_a_shipped_mechanism(run, tmp_path):
     result = run("draw", "four_bar")
-    assert result.exit_code == 0
-    assert result.stdout == "written: four_bar.html: four_bar: closes, and the crank turns through\n"
+    assert result.code == 0
+    assert result.out == "written: four_bar.html: four_bar: closes, and the crank turns through\n"
     page = (tmp_path / "four_bar.html").read_text()
     assert "200.00" in page  # mm, of the coupler
     assert 'content="leg-wear-monitor draw"' in page
 
 
-def test_what_does_not_close_is_drawn_and_said_with_its_gap(run, long_coupler, complaints):
+def test_what_does_not_close_is_drawn_and_said_with_its_gap(run, long_coupler):
     out = long_coupler.with_suffix(".html")
     result = run("draw", str(long_coupler), "--out", str(out))
-    assert result.exit_code == 1
-    assert re.search(r"does not close: joint [A-D] .* is open by 200 mm$", result.stdout.strip())
-    (line,) = complaints(result)
+    assert result.code == 1
+    assert re.search(r"does not close: joint [A-D] .* is open by 200 mm$", result.out.strip())
+    (line,) = result.lines
     assert line.startswith(f"warning: {long_coupler}: assembly: joint ")
     assert "least gap is 100 mm, at 180.0 deg" in line
     assert '"gap_mm": [200.0, ' in out.read_text()
 
 
-def test_a_start_far_from_the_assembly_is_drawn_as_found(run, shipped, complaints, tmp_path):
+def test_a_start_far_from_the_assembly_is_drawn_as_found(run, shipped, tmp_path):
     (tmp_path / "far.yaml").write_text(shipped("four_bar").replace("0.0, 1.6961]", "0.0, 2.3]"))
     result = run("draw", "far.yaml")
-    assert (result.exit_code, len(complaints(result))) == (1, 1)
-    assert "no assembly near the given start" in result.stderr
+    assert (result.code, len(result.lines)) == (1, 1)
+    assert "no assembly near the given start" in result.err
 
 
 def test_names_are_text(run, evil, tmp_path):
-    assert run("draw", evil).exit_code == 0
+    assert run("draw", evil).code == 0
     page = (tmp_path / "evil.html").read_text()
     assert EVIL not in page and "<script>alert" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;$x^{" in page
@@ -68,16 +68,16 @@ def test_names_are_text(run, evil, tmp_path):
         (["nope.yaml"], "nope.yaml: cannot be read: No such file or directory"),
     ],
 )
-def test_bad_input_is_one_line_and_no_file(run, complaints, tmp_path, arguments, fault):
+def test_bad_input_is_one_line_and_no_file(run, tmp_path, arguments, fault):
     result = run("draw", *arguments)
-    assert (result.exit_code, result.stdout) == (2, "")
-    (line,) = complaints(result)
+    assert (result.code, result.out) == (2, "")
+    (line,) = result.lines
     assert line.startswith(f"error: {fault}")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_robot_description_in_place_of_a_picture(run, tmp_path):
     line = ("draw", "slider_crank", "--out", "slider_crank.urdf")
-    assert run(*line).exit_code == 0
+    assert run(*line).code == 0
     text = (tmp_path / "slider_crank.urdf").read_text()
     assert ElementTree.fromstring(text).get("name") == "slider_crank"

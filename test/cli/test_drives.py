@@ -22,15 +22,15 @@ EACH = pytest.mark.parametrize(
 @EACH
 def test_the_list_has_every_name(run, verb, names, known, one, of_it):
     result = run(verb)
-    assert result.exit_code == 0
-    assert [line for line in result.stdout.splitlines() if not line.startswith(" ")] == list(names)
-    assert known in result.stdout
-    assert [each["name"] for each in json.loads(run(verb, "--json", "-").stdout)[verb]] == list(names)
+    assert result.code == 0
+    assert [line for line in result.out.splitlines() if not line.startswith(" ")] == list(names)
+    assert known in result.out
+    assert [each["name"] for each in json.loads(run(verb, "--json", "-").out)[verb]] == list(names)
 
 
 @EACH
 def test_one_in_full_has_every_source(run, verb, names, known, one, of_it):
-    text = run(verb, one.name).stdout
+    text = run(verb, one.name).out
     assert of_it in text
     for key, value in one.values():
         assert f"{key}: {value.central:g}" in text
@@ -38,9 +38,9 @@ def test_one_in_full_has_every_source(run, verb, names, known, one, of_it):
 
 
 def test_json_has_the_numbers_of_the_files(run):
-    (drive,) = json.loads(run("drives", "pulse115-60", "--json", "-").stdout)["drives"]
+    (drive,) = json.loads(run("drives", "pulse115-60", "--json", "-").out)["drives"]
     assert drive["bandwidth"]["value"] == drive["bandwidth"]["si"] == 66.3
-    (pair,) = json.loads(run("materials", "du-on-steel-dry", "--json", "-").stdout)["materials"]
+    (pair,) = json.loads(run("materials", "du-on-steel-dry", "--json", "-").out)["materials"]
     assert (pair["limits"]["pressure_speed"]["value"], pair["limits"]["pressure_speed"]["si"]) == (1.8, 1.8e6)
     assert pair["friction"]["range"] == [0.02, 0.25]
 
@@ -61,8 +61,8 @@ def test_check_prints_what_is_declared_of_the_drive(run, tmp_path: Path, monkeyp
     drive = "{type: erob80-50, gear_ratio: 2.0, lag_s: 0.004, stiffness_nm_per_rad: 800.0}"
     Path("monitor.yaml").write_text(f"/**: {{ros__parameters: {{drive: {drive}}}}}", encoding="utf-8")
     result = run("check", "monitor.yaml")
-    assert result.exit_code == 0
-    line = next(line for line in result.stdout.splitlines() if "at the crank" in line)
+    assert result.code == 0
+    line = next(line for line in result.out.splitlines() if "at the crank" in line)
     assert line.strip() == (
         "drive erob80-50, at the crank: lag 0.004 s, load friction 0.036, "
         "Coulomb friction 6.52 N m, viscous friction 5.612 N m s/rad, stiffness 800 N m/rad; "

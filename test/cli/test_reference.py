@@ -20,18 +20,18 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
     monkeypatch.setattr(torque_reference, "CLEARANCE_FACTORS", (2.0,))
     monkeypatch.setattr(torque_reference, "_SETTLING", 0)
     result = run("reference", "bionic_leg", "--cadence", "57", "--cadence", "-60", "--out", "leg.npz")
-    assert result.exit_code == 0, result.stderr
-    assert "bionic_leg at 57 rpm: 24 legs, 1 gait cycles each" in result.stdout
-    assert "written: leg.npz, after " in result.stdout
-    assert result.stderr == ""  # no progress bar in a pipe
+    assert result.code == 0, result.err
+    assert "bionic_leg at 57 rpm: 24 legs, 1 gait cycles each" in result.out
+    assert "written: leg.npz, after " in result.out
+    assert result.err == ""  # no progress bar in a pipe
     (tmp_path / "monitor.yaml").write_text("/**: {ros__parameters: {diagnosis: {reference: leg.npz}}}")
-    assert ", references at 57, -60 rpm" in run("check", "monitor.yaml").stdout
+    assert ", references at 57, -60 rpm" in run("check", "monitor.yaml").out
     (tmp_path / "jansen.yaml").write_text(
         "/**: {ros__parameters: {mechanism: jansen_leg, diagnosis: {reference: leg.npz}}}"
     )
     result = run("check", "jansen.yaml")
-    assert result.exit_code == 2
-    assert "leg.npz: has torque references of a different leg (bionic_leg)" in result.stderr
+    assert result.code == 2
+    assert "leg.npz: has torque references of a different leg (bionic_leg)" in result.err
 
 
 TABLE = "crank_angle,foot_load,foot_load_along\n"
@@ -48,7 +48,7 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
     (tmp_path / "stance.csv").write_text(TABLE + "".join(rows))
     made = {}
     for name, load in (("air", ()), ("ground", ("--load", "stance.csv"))):
-        assert run("reference", "bionic_leg", *load, "--out", f"{name}.npz").exit_code == 0
+        assert run("reference", "bionic_leg", *load, "--out", f"{name}.npz").code == 0
         (made[name],) = reference_file.read_references(tmp_path / f"{name}.npz", leg)
     assert not made["air"].parameters.load.size
     known = made["ground"].parameters.load
@@ -83,9 +83,9 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
 def test_a_load_that_is_no_gait_cycle_is_refused(run, tmp_path: Path, text: str, fault: str) -> None:
     (tmp_path / "stance.csv").write_text(text)
     result = run("reference", "--load", "stance.csv", "--out", "leg.npz")
-    assert result.exit_code == 2
-    assert fault in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    assert result.code == 2
+    assert fault in result.err
+    assert len(result.err.splitlines()) == 1
 
 
 @pytest.mark.parametrize(("peak", "shown"), [("0.3", "0.3 N"), ("3e6", "3e+06 N"), ("300", "")])
@@ -112,6 +112,6 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
 )
 def test_bad_command_lines_are_one_line(run, arguments: list[str], fault: str) -> None:
     result = run("reference", *arguments)
-    assert result.exit_code == 2
-    assert fault in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    assert result.code == 2
+    assert fault in result.err
+    assert len(result.err.splitlines()) == 1

@@ -4,28 +4,24 @@ import json
 import re
 import shutil
 
+import command_line
 import pytest
 from ledger_contents import rows_of
 
-from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.state import Level
+import leg_wear_monitor as lw
 
-BAGS = share_directory() / "bags"
+BAGS = lw.share_directory() / "bags"
 
 
 @pytest.fixture(scope="module")
 def knocked(tmp_path_factory):
     """Ledger and summary of a leg whose bushing G has broken."""
-    from click.testing import CliRunner
-
-    from leg_wear_monitor.cli.main import cli
-
     place = tmp_path_factory.mktemp("knocked")
     arguments = ["replay", str(BAGS / "knocking.mcap"), "--config", str(BAGS / "knocking.yaml")]
     arguments += ["--ledger", str(place / "wear.ledger"), "--out", str(place / "out")]
-    result = CliRunner().invoke(cli, arguments)
-    assert result.exit_code == 0, result.output
-    return place, result.output
+    result = command_line.run(*arguments)
+    assert result.code == 0, result.err
+    return place, result.out
 
 
 @pytest.fixture
@@ -74,12 +70,6 @@ def last_reason(ledger):
     return why
 
 
-def _alarms(ledger):
-    """Raised alarms in a ledger: level, and whether somebody has acknowledged it."""
-    rows = rows_of(ledger, "SELECT kind || ' ' || subject, level, acknowledged FROM alarm")
-    return {name.strip(): (Level(level).name, bool(seen)) for name, level, seen in rows}
-
-
 def _ends(column):
     return column, column[::-1]
 
@@ -108,7 +98,7 @@ GUIDES = (
 def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, guide):
     joint = json.loads((knocked[0] / "out" / "summary.json").read_text())["clearances"]["G"]
     value, sigma = (1e3 * joint[name] for name in ("best_estimate_m", "best_estimate_sigma_m"))
-    text = (share_directory() / "docs" / guide).read_text(encoding="utf-8")
+    text = (lw.share_directory() / "docs" / guide).read_text(encoding="utf-8")
     (estimate,) = re.findall(r"(2\.\d+) mm ± (0\.\d+) mm", text)
     assert abs(float(estimate[0]) - value) < 0.5 * sigma
     assert float(estimate[1]) == pytest.approx(sigma, rel=0.3)
@@ -116,14 +106,14 @@ def test_what_the_guides_say_of_this_recording_is_about_what_it_gives(knocked, g
 
 def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
     agrees = run("measure", "knee", "2.0", "--sigma", "0.05", "--ledger", ledger)
-    assert agrees.exit_code == 1  # it is at its limit
-    assert "this agrees with the drive torque: " in agrees.stdout
-    assert "contradicts" not in agrees.stdout
+    assert agrees.code == 1  # it is at its limit
+    assert "this agrees with the drive torque: " in agrees.out
+    assert "contradicts" not in agrees.out
 
 
 def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger, tmp_path):
     reset = run("reset", "knee", "--ledger", ledger)
-    assert "alarms cleared: clearance G, torque_mismatch; still present: none" in reset.stdout
+    assert "alarms cleared: clearance G, torque_mismatch; still present: none" in reset.out
     config = tmp_path / "leg.yaml"
     config.write_text((BAGS / "healthy.yaml").read_text().replace("healthy", "knocking"))
     run("replay", str(BAGS / "healthy.mcap"), "--config", str(config), "--ledger", ledger, "--json", "s.json")
@@ -135,7 +125,7 @@ def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger
 
 def test_acknowledged_alarms_are_kept_as_such(run, ledger):
     done = run("acknowledge", "--ledger", ledger)
-    assert done.stdout == "cleared: none; still present: clearance G, torque_mismatch\n"
+    assert done.out == "cleared: none; still present: clearance G, torque_mismatch\n"
     rows = rows_of(ledger, "SELECT kind, acknowledged FROM alarm WHERE level > 0 ORDER BY kind")
     assert rows == [("clearance", 1), ("torque_mismatch", 1)]
 

@@ -1,19 +1,14 @@
 """The command line through its own door, and the fields that are promised."""
 
 import json
-import runpy
-import signal
-import sys
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from importlib.util import find_spec
-from io import StringIO
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import attrs
+import command_line
 import numpy as np
 import pytest
 from json_fields import is_of, leaves
@@ -25,43 +20,16 @@ if not (find_spec("mcap") and find_spec("rosbags")):  # the extra `bags` is not 
         f"test_{name}.py" for name in ("diagnosis", "exit_codes", "fleet", "kills", "sample_bags")
     ]
 
-FAULTS = ("error: ", "warning: ", "note: ")
-
 RATE_HZ, PER_SAMPLE = 200, 4  # samples per second of a table; instants of the simulation per sample
 NEW_M = 3.0e-4
 
 Columns = dict[str, np.ndarray]
 
 
-@attrs.frozen
-class Done:
-    """Exit code, stdout, and the lines on stderr that tell of a fault."""
-
-    code: int
-    out: str
-    lines: list[str]
-
-
 @pytest.fixture(scope="session")
-def run() -> Callable[..., Done]:
-    """Call ``python -m leg_wear_monitor`` in this process, which has loaded the kernels already."""
-
-    def call(*arguments: object) -> Done:
-        out, err, code = StringIO(), StringIO(), 0
-        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-        line = ["leg-wear-monitor", *map(str, arguments)]
-        try:
-            with patch.object(sys, "argv", line), redirect_stdout(out), redirect_stderr(err):
-                runpy.run_module("leg_wear_monitor", run_name="__main__", alter_sys=True)
-        except SystemExit as end:
-            code = int(end.code or 0)
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
-        lines = err.getvalue().splitlines()
-        return Done(code, out.getvalue(), [line for line in lines if line.startswith(FAULTS)])
-
-    return call
+def run() -> Callable[..., command_line.Done]:
+    """Call the command line in this process."""
+    return command_line.run
 
 
 @pytest.fixture(scope="session")

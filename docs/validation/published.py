@@ -92,7 +92,7 @@ def slider_crank() -> None:
 
 
 def restitution() -> None:
-    dropped = case("contact/normal/test_hysteresis.py")["dropped"]
+    dropped = case("contact/test_normal.py")["dropped"]
     print("\n### Delivered restitution for a requested one\n")
     laws = [name for name, law in LAWS.items() if law.form is HERTZ and name != "hertz"]
     table("requested", *laws)
@@ -106,10 +106,10 @@ def restitution() -> None:
 
 
 def archard() -> None:
-    test = case("wear/test_archard.py")
+    test = case("wear/test_wear.py")
     leg = load_mechanism("bionic_leg")
     size = {"bushing_radius": test["RADIUS"], "radial_clearance": test["CLEARANCE"], "width": test["WIDTH"]}
-    settings = attrs.evolve(leg.clearances["G"], **size, wear_coefficient=(test["WEAR"], 0.0))
+    settings = attrs.evolve(leg.clearances["G"], **size, wear_coefficient=(test["BUSHING_WEAR"], 0.0))
     contacts = compile_contacts(leg, ["G"], [settings])
     print("\n### Archard in a bushing\n")
     table(

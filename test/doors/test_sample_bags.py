@@ -14,7 +14,7 @@ import leg_wear_monitor as lw
 
 BAGS = lw.share_directory() / "bags"
 # Relative bounds of forces and wear over eight or ten cycles: 5.3 sigma of the difference of two such means,
-# by the sigma over five cycles in test/dynamics/clearance/test_sets.py (32 runs, 2026-11-23), a fifth more.
+# by the sigma over five cycles (32 runs, 2026-11-23), a fifth more.
 SCATTER = {
     "A": (0.02, 0.03), "B": (0.02, 0.16), "G": (0.02, 0.15), "I": (0.03, 0.31), "J": (0.13, 0.58),
 }  # fmt: skip

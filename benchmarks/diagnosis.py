@@ -60,8 +60,8 @@ from leg_wear_monitor.twin.reference import (
     cycle_profile,
     mean_profile,
 )
+from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.twin.sample import gait_samples
-from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept

@@ -14,8 +14,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.life.jumps import JumpControl
-from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.life import JumpControl, LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting

@@ -38,8 +38,7 @@ from scipy.integrate import solve_ivp
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
-from leg_wear_monitor.dynamics.full_model import FullScratch, accelerate, full_scratch
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_RATE, FullRun
+from leg_wear_monitor.dynamics.full_run import TOLERANCE_RATE, FullRun, FullScratch, accelerate, full_scratch
 from leg_wear_monitor.dynamics.run import (
     DRIVE_RATES,
     FORCE,

@@ -29,9 +29,15 @@ if TYPE_CHECKING:
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Duty, Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.materials import Material, load_material, materials
+    from leg_wear_monitor.mechanism.materials import (
+        Drive,
+        Material,
+        drives,
+        load_drive,
+        load_material,
+        materials,
+    )
     from leg_wear_monitor.mechanism.person import with_ground_reaction, with_person
-    from leg_wear_monitor.mechanism.sourced import Drive, drives, load_drive
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -48,7 +54,7 @@ _HOME = {
     "BushingLife": "life.design",
     "CommissioningItem": "commissioning.result",
     "CommissioningResult": "commissioning.result",
-    "Drive": "mechanism.sourced",
+    "Drive": "mechanism.materials",
     "Duty": "life.result",
     "EnergyBalance": "dynamics.result",
     "Fleet": "fleet.overview",
@@ -72,10 +78,10 @@ _HOME = {
     "WearMonitor": "monitor.wear_monitor",
     "commission": "commissioning.commission",
     "design": "life.design",
-    "drives": "mechanism.sourced",
+    "drives": "mechanism.materials",
     "gait_samples": "twin.sample",
     "load_config": "monitor.config.parameters",
-    "load_drive": "mechanism.sourced",
+    "load_drive": "mechanism.materials",
     "load_material": "mechanism.materials",
     "load_mechanism": "mechanism.loader",
     "load_study": "studies.run",

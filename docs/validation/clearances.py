@@ -5,8 +5,7 @@ import argparse
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full_model import BAUMGARTE
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.full_run import BAUMGARTE, TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics, percentile
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.statistics import energy_balance

@@ -15,9 +15,9 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import TORQUE as TORQUE_KIND
+from leg_wear_monitor.twin.crank_motion import MOVE, SPLINE_NODE, join_smoothly
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import TrackerSettings, TwinSettings, gait_samples
-from leg_wear_monitor.twin.steps import MOVE, SPLINE_NODE, join_smoothly
 from leg_wear_monitor.twin.tracker import CrankTracker
 
 LAGS_S = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.contact.arrays import compile_contacts
-from leg_wear_monitor.contact.normal import HERTZ, LAWS, delivered_restitution
+from leg_wear_monitor.contact.laws import HERTZ, LAWS, delivered_restitution
 from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.run import POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare

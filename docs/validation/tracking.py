@@ -12,9 +12,9 @@ from leg_wear_monitor.dynamics.run import ARCHARD, DONE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, ideal_motion
+from leg_wear_monitor.twin.crank_motion import MOVE, SPLINE_NODE, join_smoothly
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples, TrackerSettings, TwinSettings, gait_samples
-from leg_wear_monitor.twin.steps import MOVE, SPLINE_NODE, join_smoothly
 from leg_wear_monitor.twin.tracker import CrankTracker
 
 BANDWIDTHS_HZ, RATES_HZ = (3.0, 5.0, 8.0, 12.0, 20.0), (50.0, 200.0, 1000.0)

@@ -15,7 +15,7 @@ from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.streams import STREAMS
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
-from leg_wear_monitor.twin.torque_reference import TorqueReferenceRun
+from leg_wear_monitor.twin.references import TorqueReferenceRun
 from leg_wear_monitor.workers import results
 
 

@@ -13,7 +13,7 @@ from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, nested, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.findings import Finding
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 
 if TYPE_CHECKING:
     import pandas as pd

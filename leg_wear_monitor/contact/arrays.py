@@ -8,9 +8,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.configuration import FieldError
-from leg_wear_monitor.contact.friction import FRICTION_CODES
 from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal import LAWS, delivered_restitution
+from leg_wear_monitor.contact.laws import FRICTION_CODES, LAWS, delivered_restitution
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism

@@ -4,9 +4,14 @@ import math
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest
-from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import journal_contact, worn_contact
-from leg_wear_monitor.contact.normal import elastic_energy, law_coefficient, normal_force, softening
+from leg_wear_monitor.contact.laws import (
+    elastic_energy,
+    friction_force,
+    law_coefficient,
+    normal_force,
+    softening,
+)
 from leg_wear_monitor.dynamics.run import begin_impact, end_impact, hermite, parabola_peak, raise_peak
 from leg_wear_monitor.wear import deposit_wear, local_surfaces
 

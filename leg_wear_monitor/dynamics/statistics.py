@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_under_load, is_winkler_form
+from leg_wear_monitor.contact.geometry import contact_doubt, half_angle_under_load, is_winkler_form
 from leg_wear_monitor.dynamics.joint import DELTA, EX, EY, F_N, F_T, VX, VY
 from leg_wear_monitor.dynamics.result import (
     ClearanceResult,

@@ -32,7 +32,7 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 
 # tried delays, and low-passes of 100 to 10 Hz
 _DELAYS_S = np.linspace(LEAST_DELAY_S, MOST_DELAY_S, 13)

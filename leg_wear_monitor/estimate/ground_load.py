@@ -28,7 +28,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import FORE_AFT, PHASES, Stance, nominal_stance, stance_template
 from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_motion
 from leg_wear_monitor.twin.load import at_points
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 
 _HARMONICS = 12  # sin(k pi s) over stance, in each component
 

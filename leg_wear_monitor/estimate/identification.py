@@ -32,7 +32,7 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.torque_reference import (
+from leg_wear_monitor.twin.references import (
     HEAVIER,
     LONGER,
     ROUGHER,

@@ -27,7 +27,7 @@ from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.load import load_shape, load_signatures
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
 _FRICTION_CHANGE = 0.1  # fraction of the torque's size

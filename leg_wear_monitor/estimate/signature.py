@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference import POINTS
-from leg_wear_monitor.twin.torque_reference import FRICTIONS, MASSES, TorqueReference
+from leg_wear_monitor.twin.references import FRICTIONS, MASSES, TorqueReference
 
 SAMPLES = 200  # per gait cycle: faster samples are averaged, since clearances show at this rate already
 

@@ -1,16 +1,15 @@
 """Result of a life: states of wear over gait cycles, and when a clearance reaches its limit."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.conformity import contact_doubt, half_angle_of
+from leg_wear_monitor.contact.geometry import contact_doubt, half_angle_of
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, finite_or_none, json_text
-from leg_wear_monitor.life.jumps import WearRate, opening
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import (
     bushing_of,
@@ -119,45 +118,6 @@ SCHEMA_VERSION = 1
 """Version of the JSON; counts up when a field is renamed, removed or means something else."""
 
 _OF_JOINTS = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class LifePoint:
-    """A leg at one time of its life; k clearance joints.
-
-    Attributes
-    ----------
-    cycles : float
-        Gait cycles since the life began.
-    depth : (k, 2, N) array, m
-        Wear of bushing and journal.
-    rate : WearRate
-        Mean wear per cycle around this time.
-    peak_force_n : (k,) array
-        Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
-    rubbing_j_per_cycle : (k,) array
-        Integral of ``F_N |v_t| dt`` over a gait cycle, mean over the simulated cycles.
-    archard_j : (k,) array
-        The same integral since the life began.
-    part_growth_m : (parts, k) array
-        Growth of the mean clearances per cycle under each load of the duty; one part without a duty.
-    error_m : float
-        Estimated error of the mean clearance in the jump to this point.
-    """
-
-    cycles: float = 0.0
-    depth: Floats
-    rate: WearRate
-    peak_force_n: Floats
-    rubbing_j_per_cycle: Floats
-    archard_j: Floats
-    part_growth_m: Floats
-    error_m: float = 0.0
-
-    @property
-    def opened_m(self) -> Floats:
-        """Growth of the mean clearances (k,) since new [m]."""
-        return opening(self.depth)
 
 
 @attrs.frozen(eq=False)
@@ -292,35 +252,6 @@ class Life:
             If pandas is not installed.
         """
         return data_frame(self.columns(), index=["joint", "cycles"])
-
-
-def life_of(
-    clearance_joints: tuple[str, ...],
-    fresh_m: Floats,
-    points: Sequence[LifePoint],
-    period_s: float,
-    duty: Duty | None = None,
-) -> Life:
-    """The life that consists of the given points; parameters as in `Life`."""
-    depth = np.array([point.depth for point in points])
-    both, sectors = depth.sum(axis=2), depth.shape[-1]
-    deepest = (depth[:, :, 0].argmax(axis=2) + 0.5) * (360.0 / sectors)
-    return Life(
-        clearance_joints=clearance_joints,
-        cycles=np.array([point.cycles for point in points]),
-        clearance_m=fresh_m + both.mean(axis=2),
-        clearance_max_m=fresh_m + both.max(axis=2),
-        worst_sector_deg=np.where(depth[:, :, 0].max(axis=2) > 0.0, deepest, np.nan),
-        peak_force_n=np.array([point.peak_force_n for point in points]),
-        growth_m_per_cycle=np.array([point.rate.clearance for point in points]),
-        growth_error_m_per_cycle=np.array([point.rate.scatter for point in points]),
-        error_m=np.array([point.error_m for point in points]),
-        depth=depth,
-        rubbing_j_per_cycle=np.array([point.rubbing_j_per_cycle for point in points]),
-        period_s=period_s,
-        duty=duty,
-        part_growth_m_per_cycle=np.array([point.part_growth_m for point in points]),
-    )
 
 
 # Load of the bushings of a leg that wears, for the limits and formulas of their makers.

@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.twin.angle_reference import PHASES, AngleModel, AngleReference
+from leg_wear_monitor.twin.references import PHASES, AngleModel, AngleReference
 
 _RIDGE = 1.0e-9
 _HUBER = 1.5  # standard deviations beyond which a bin loses weight

@@ -35,8 +35,8 @@ from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile, mean_profile
+from leg_wear_monitor.twin.references import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples, newest, of_crank, within
 from leg_wear_monitor.twin.statistics import CycleStatistics
 

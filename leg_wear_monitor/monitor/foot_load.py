@@ -34,7 +34,7 @@ from leg_wear_monitor.monitor.verdict.situation import ACTS
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import FootLoad, Level
 from leg_wear_monitor.twin import KINDS, LOAD
-from leg_wear_monitor.twin.follower_state import FINE_PHASES
+from leg_wear_monitor.twin.following import FINE_PHASES
 from leg_wear_monitor.twin.sample import CONTACT, MEASURED, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile, means_by_phase
 

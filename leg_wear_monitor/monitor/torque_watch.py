@@ -35,9 +35,9 @@ from leg_wear_monitor.monitor.verdict.verdict import estimate
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
 from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.references import TorqueReference
 from leg_wear_monitor.twin.sample import LOADS_N, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
-from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 _LOG = logging.getLogger(__name__)
 

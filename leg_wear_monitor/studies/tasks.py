@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.batch import Leg, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Snapshot
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.joint import EX, EY, F_N, F_T, VX, VY
@@ -24,6 +23,7 @@ from leg_wear_monitor.dynamics.run import (
     steady_drive,
     stop,
 )
+from leg_wear_monitor.dynamics.simulation import Leg, prepare_legs
 from leg_wear_monitor.dynamics.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.mechanism import position

@@ -7,7 +7,7 @@ from leg_wear_monitor.compiled.kernel import Record
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.twin.follower_state import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS
+from leg_wear_monitor.twin.following import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS
 from leg_wear_monitor.twin.sample import LOADS_N
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,

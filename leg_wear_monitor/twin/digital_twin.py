@@ -33,8 +33,8 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import heavier_person_torque
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, check_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin import cycle, follower_state
-from leg_wear_monitor.twin import steps as step_codes
+from leg_wear_monitor.twin import crank_motion, cycle, following
+from leg_wear_monitor.twin.crank_motion import MOVE, Steps
 from leg_wear_monitor.twin.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.load import FootLoad, shape_torque, torque_size
 from leg_wear_monitor.twin.reference import LegParameters, drive_coupling
@@ -61,7 +61,6 @@ from leg_wear_monitor.twin.statistics import (
     joined,
     means_by_phase,
 )
-from leg_wear_monitor.twin.steps import MOVE, Steps
 from leg_wear_monitor.twin.tracker import CrankTracker
 
 _CUTOFF = TURN * 10.0  # rad/s: of the low-pass filter of measured and predicted torque
@@ -72,13 +71,13 @@ _MAX_FRICTION = 0.3  # of the RMS torque: joints and gears lose some tenths; a l
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
-    step_codes.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
-    step_codes.LOST_BY_OUTLIERS: TwinEventKind.LOST_BY_OUTLIERS,
-    step_codes.LOST_BY_OVERFLOW: TwinEventKind.LOST_BY_OVERFLOW,
-    step_codes.LOST_BY_JUMP: TwinEventKind.BACKWARD_JUMP,
-    step_codes.STOPPED: TwinEventKind.STOPPED,
-    step_codes.MOVING: TwinEventKind.MOVING,
-    step_codes.REVERSED: TwinEventKind.REVERSED,
+    crank_motion.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
+    crank_motion.LOST_BY_OUTLIERS: TwinEventKind.LOST_BY_OUTLIERS,
+    crank_motion.LOST_BY_OVERFLOW: TwinEventKind.LOST_BY_OVERFLOW,
+    crank_motion.LOST_BY_JUMP: TwinEventKind.BACKWARD_JUMP,
+    crank_motion.STOPPED: TwinEventKind.STOPPED,
+    crank_motion.MOVING: TwinEventKind.MOVING,
+    crank_motion.REVERSED: TwinEventKind.REVERSED,
 }
 _FAILURES = {
     run.STEP_TOO_SMALL: TwinEventKind.STEP_TOO_SMALL,
@@ -142,7 +141,7 @@ class DigitalTwin:
         # a whole number of nanoseconds, so that the stepper's time does not drift from the stamps
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
-        self._leg: follower_state.FollowerState = follower_state.leg_state(len(setup.clearance_joints))
+        self._leg: following.FollowerState = following.leg_state(len(setup.clearance_joints))
         self._state: Record = record_of(self._leg.records)
         # of the present gait cycle
         self._statistics = run.new_run_statistics(len(setup.linkage.mechanism.joints))
@@ -157,7 +156,7 @@ class DigitalTwin:
         )
         self._repeating = cycle.RepeatingResidual(*kept)
         self._tolerated_nm = self._of_person() if mechanism.person_kg else None
-        self._sensor = new_records(1, follower_state.TORQUE_SENSOR)
+        self._sensor = new_records(1, following.TORQUE_SENSOR)
         self._sensor[0] = _CUTOFF, self.torque_size_nm, self._instants, 0.0, 0.0
         self._before = self._clearances
         self.estimate = cycle.LoadEstimate()
@@ -371,7 +370,7 @@ class DigitalTwin:
                 joint = self.clearance_joints[k] if k >= 0 else None
                 events.append(Event(int(self._state.motion.failed_at_ns), _FAILURES[reason], joint))
         stamp, kind, angle, torque, measured = (
-            evaluated[name][:m] for name in follower_state.EVALUATED.names or ()
+            evaluated[name][:m] for name in following.EVALUATED.names or ()
         )
         at = eccentricities[:m].reshape(m, forces.shape[1], 2)
         return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured, at)
@@ -379,7 +378,7 @@ class DigitalTwin:
     def _room(self, n: int) -> tuple[Records, Floats, Floats]:
         """Room for n samples: `EVALUATED`, contact forces (n, k) [N], and eccentricities (n, 2 k) [m]."""
         joints = len(self.clearance_joints)
-        return new_records(n, follower_state.EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
+        return new_records(n, following.EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion at the begin of step i, with its wear unchanged; returns the event."""
@@ -495,7 +494,7 @@ class DigitalTwin:
         load, mean_n, phases = (
             cycle.load_profile(self._state),
             self._load.acting_n,
-            follower_state.FINE_PHASES,
+            following.FINE_PHASES,
         )
         acts = self._load.rows.learned.any() and mean_n.any() and not self._state.last_load.is_frozen
         if load is None or not acts:
@@ -506,7 +505,7 @@ class DigitalTwin:
 
     def _by_phases(self, torque: Floats) -> Floats:
         """A torque (n,) over a turn at the commanded speed, by the phases of the residual."""
-        phases = follower_state.PHASES if self._instants else follower_state.FINE_PHASES
+        phases = following.PHASES if self._instants else following.FINE_PHASES
         return cycle.behind_low_pass(torque, phases, _CUTOFF, self._setup.speed, self._instants)
 
     def _of_person(self) -> Floats:
@@ -515,7 +514,7 @@ class DigitalTwin:
 
     def _set_friction(self) -> None:
         """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
-        constant, under_load = self.estimate.values[[follower_state.FRICTION, follower_state.LOAD_FRICTION]]
+        constant, under_load = self.estimate.values[[following.FRICTION, following.LOAD_FRICTION]]
         self._sensor["friction"] = min(max(float(constant), 0.0), self.max_friction_nm)
         self._sensor["load_friction"] = under_load
 
@@ -526,7 +525,7 @@ class DigitalTwin:
             by_phase[1] -= by_phase[0] * self._by_phases(step_nm)
             return by_phase
         direction = 1 if self._state.motion.cut_rises else -1
-        lag_s = self.settings.torque_lag_s, float(self.estimate.values[follower_state.LAG])
+        lag_s = self.settings.torque_lag_s, float(self.estimate.values[following.LAG])
         duration_s = float(self._statistics.time[0])
         return cycle.averages_by_phase(profile, acting_n, lag_s, direction, duration_s, _CUTOFF)
 
@@ -537,5 +536,5 @@ class DigitalTwin:
         loads = (-math.inf, math.inf) if self._instants else LOADS_N
         left_nm = self._repeating.rms_nm(loads, self._tolerated_nm)
         # steps differ from the template
-        step_nm = self._shape_torque * float(self.estimate.values[follower_state.LOAD])
+        step_nm = self._shape_torque * float(self.estimate.values[following.LOAD])
         return math.sqrt(max(0.0, left_nm**2 - step_nm**2)) if math.isfinite(left_nm) else left_nm

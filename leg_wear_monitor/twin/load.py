@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import Basis
 from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force, under_trial_force
-from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_basis, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import POINTS, Basis, build_basis, build_tables
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards

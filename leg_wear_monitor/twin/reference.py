@@ -11,7 +11,6 @@ import numpy as np
 
 from leg_wear_monitor.compiled.kernel import entry
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
-from leg_wear_monitor.dynamics.clearance.basis import is_damped
 from leg_wear_monitor.dynamics.clearance.model import ClearanceModel, Coupling, coupling_of, rigid_coupling
 from leg_wear_monitor.dynamics.clearance.stepper import (
     INTERVALS,
@@ -22,7 +21,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     under_trial_force,
 )
 from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables, is_damped
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats

@@ -13,13 +13,32 @@ from leg_wear_monitor.compiled.kernel import (
 )
 from leg_wear_monitor.twin import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.crank_motion import (
+    ACQUIRE_NS,
+    ARRIVALS,
+    BACKWARD_JUMP_NS,
+    BRIDGE_LIMIT_NS,
+    EVALUATE,
     FIRST_LOAD_N,
     IS_STARTING,
+    LOST_BY_JUMP,
+    LOST_BY_OUTLIERS,
+    LOST_BY_OVERFLOW,
+    LOST_IN_GAP,
+    MARK_GAP_NS,
+    QUEUE,
+    QUEUED,
+    REORDER_WINDOW_NS,
+    TRACKER_STATE,
+    Steps,
+    TrackerState,
+    add_step,
     begin_filter,
     judge_load,
     lose,
     note_prediction,
     reach_spline_nodes,
+    room_for_steps,
+    tracker_model,
     update,
 )
 from leg_wear_monitor.twin.sample import (
@@ -31,29 +50,6 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
     Samples,
     TrackerSettings,
-)
-from leg_wear_monitor.twin.steps import (
-    EVALUATE,
-    LOST_BY_JUMP,
-    LOST_BY_OUTLIERS,
-    LOST_BY_OVERFLOW,
-    LOST_IN_GAP,
-    Steps,
-    add_step,
-    room_for_steps,
-)
-from leg_wear_monitor.twin.tracker_state import (
-    ACQUIRE_NS,
-    ARRIVALS,
-    BACKWARD_JUMP_NS,
-    BRIDGE_LIMIT_NS,
-    MARK_GAP_NS,
-    QUEUE,
-    QUEUED,
-    REORDER_WINDOW_NS,
-    TRACKER_STATE,
-    TrackerState,
-    tracker_model,
 )
 
 # Arriving samples: faults, plausibility of stamps, order (physics.md section 9).

@@ -11,14 +11,14 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.person import nominal_stance, read_toe_force
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis import reference_file
-from leg_wear_monitor.twin import torque_reference
+from leg_wear_monitor.twin import references
 from leg_wear_monitor.twin.load import load_signatures
 
 
 def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(reference_file, "BEFOREHAND_CYCLES", 1)
-    monkeypatch.setattr(torque_reference, "CLEARANCE_FACTORS", (2.0,))
-    monkeypatch.setattr(torque_reference, "_SETTLING", 0)
+    monkeypatch.setattr(references, "CLEARANCE_FACTORS", (2.0,))
+    monkeypatch.setattr(references, "_SETTLING", 0)
     result = run("reference", "bionic_leg", "--cadence", "57", "--cadence", "-60", "--out", "leg.npz")
     assert result.code == 0, result.err
     assert "bionic_leg at 57 rpm: 24 legs, 1 gait cycles each" in result.out
@@ -40,7 +40,7 @@ TABLE = "crank_angle,foot_load,foot_load_along\n"
 def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Path, monkeypatch) -> None:
     """The table is another discretisation of a force; the torque is that of the force, by virtual work."""
     monkeypatch.setattr(reference_file, "BEFOREHAND_CYCLES", 2)
-    monkeypatch.setattr(torque_reference, "CLEARANCE_FACTORS", (2.0,))
+    monkeypatch.setattr(references, "CLEARANCE_FACTORS", (2.0,))
     leg = load_mechanism("bionic_leg")
     linkage = build_linkage(leg)
     force = 300.0 * nominal_stance(linkage).force(points=360)

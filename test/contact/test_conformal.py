@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.contact.conformity import (
+from leg_wear_monitor.contact.geometry import (
     NARROW_RAD,
     WIDEST_RAD,
     conformity_doubts,
     contact_doubt,
+    contact_modulus,
     half_angle_of,
     half_angle_under_load,
 )
-from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal import (
+from leg_wear_monitor.contact.laws import (
     LAWS,
     elastic_energy,
     law_coefficient,

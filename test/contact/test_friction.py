@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.compiled.kernel import kernel
-from leg_wear_monitor.contact.friction import (
+from leg_wear_monitor.contact.laws import (
     FRICTION_CODES,
     RAMPS,
     ambrosio_ramp,
@@ -89,7 +89,7 @@ def test_a_law_by_the_contributor_s_page_works_in_both_models(tmp_path):
     shutil.copytree(ROOT / "config", tmp_path / "config")
     shutil.copy(ROOT / "package.xml", tmp_path)
     for name, old, new in (
-        ("contact/friction.py", "RAMPS = {", f"{recipe()}\n\nRAMPS = {{'brown-mcphee': brown_mcphee_ramp, "),
+        ("contact/laws.py", "RAMPS = {", f"{recipe()}\n\nRAMPS = {{'brown-mcphee': brown_mcphee_ramp, "),
         ("mechanism/__init__.py", "FRICTION_LAWS = (", "FRICTION_LAWS = ('brown-mcphee', "),
     ):
         path = tmp_path / "leg_wear_monitor" / name

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal import (
+from leg_wear_monitor.contact.laws import (
     HERTZ,
     LAWS,
     contact_stiffness,

@@ -15,7 +15,7 @@ import attrs
 import pytest
 
 from leg_wear_monitor.fleet import description
-from leg_wear_monitor.mechanism import materials, sourced, spec
+from leg_wear_monitor.mechanism import materials, spec
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
@@ -120,24 +120,24 @@ def fleet_keys(name: str) -> str:
 
 def sourced_keys(kind: Any) -> str:
     """Keys of a file whose values have sources."""
-    inherited = {field.name for field in attrs.fields(sourced.SourcedValue)}
+    inherited = {field.name for field in attrs.fields(materials.SourcedValue)}
     rows = (
         (
             f"`{field.name}`", field.metadata.get("dimension", ""),
             "yes" if field.default is attrs.NOTHING else "", field.metadata["doc"],
         )
         for field in attrs.fields(kind)
-        if not (kind is sourced.WearCoefficient and field.name in inherited)
+        if not (kind is materials.WearCoefficient and field.name in inherited)
     )  # fmt: skip
     return table("key | measures | required | meaning", rows)
 
 
 def units(of_drives: bool) -> str:
     """Units of the files of drives, or of those of materials; both may have a number."""
-    dimensions = {field.metadata.get("dimension") for field in attrs.fields(sourced.Drive)}
+    dimensions = {field.metadata.get("dimension") for field in attrs.fields(materials.Drive)}
     rows = (
         (f"`{name}`", unit.dimension, f"{unit.factor:.6g}")
-        for name, unit in sourced.UNITS.items()
+        for name, unit in materials.UNITS.items()
         if (unit.dimension in dimensions) is of_drives or unit.dimension == "number"
     )
     return table("unit | measures | factor to SI", rows)
@@ -148,7 +148,7 @@ def of_materials(name: str) -> str:
         return units(of_drives=False)
     if name != "pairs":
         kind = name.removeprefix("keys of ")
-        return sourced_keys(getattr(materials, kind, None) or getattr(sourced, kind))
+        return sourced_keys(getattr(materials, kind))
 
     def row(name: str) -> Iterator[str]:
         pair = materials.load_material(name)
@@ -167,15 +167,15 @@ def of_drives(name: str) -> str:
     if name == "units":
         return units(of_drives=True)
     if name == "keys of Drive":
-        return sourced_keys(sourced.Drive)
+        return sourced_keys(materials.Drive)
 
     def row(name: str) -> tuple[str, ...]:
-        drive = sourced.load_drive(name)
+        drive = materials.load_drive(name)
         known = {key: value.text for key, value in drive.values()}
         return (f"`{name}`", drive.title, *(known.get(key, "") for key in FIGURES))
 
     head = " | ".join(("name", "drive", *(figure.replace("_", " ") for figure in FIGURES)))
-    return table(head, map(row, sourced.drives()))
+    return table(head, map(row, materials.drives()))
 
 
 PLAIN_TABLES = {

@@ -7,11 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.batch import Leg, advance_batch, prepare_legs
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, new_run_statistics, steady_drive
-from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.simulation import Leg, advance_batch, prepare, prepare_legs
 from leg_wear_monitor.mechanism.position import TURN
 
 SHORT = {"cycles": 0.2, "skip_cycles": 0.1}

@@ -5,8 +5,14 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import COARSER, changing_shapes, motion_shapes, views
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import (
+    COARSER,
+    ClearanceTables,
+    build_tables,
+    changing_shapes,
+    motion_shapes,
+    views,
+)
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import applied_forces_at, external_power
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism

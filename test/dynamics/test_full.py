@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
-from leg_wear_monitor.dynamics.full_model import (
+from leg_wear_monitor.dynamics.full_run import (
     BAUMGARTE,
+    FullRun,
     accelerate,
     add_contacts,
     eccentricity,
     full_model,
     full_scratch,
 )
-from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.joint import joint_force
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from leg_wear_monitor.dynamics.clearance.advance import inverse_cube_root
-from leg_wear_monitor.dynamics.full_model import NO_TOE, factorise, ideal_toe, interpolate, substitute
+from leg_wear_monitor.dynamics.full_run import NO_TOE, factorise, ideal_toe, interpolate, substitute
 from leg_wear_monitor.dynamics.run import (
     DEGREE,
     STAGES,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.arrays import ContactArrays, clearance_settings, compile_contacts
 from leg_wear_monitor.contact.geometry import journal_contact
-from leg_wear_monitor.contact.normal import LAWS
+from leg_wear_monitor.contact.laws import LAWS
 from leg_wear_monitor.dynamics.joint import (
     DELTA,
     DELTA_DOT,

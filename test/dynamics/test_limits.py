@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.full_model import BAUMGARTE
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.full_run import BAUMGARTE, TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import closures_at

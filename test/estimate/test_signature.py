@@ -20,7 +20,7 @@ from leg_wear_monitor.estimate.signature import (
 )
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=10.0)
 ANGLE = 2.0 * np.pi * (np.arange(200) + 0.5) / 200

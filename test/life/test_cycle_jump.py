@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.life.jumps import (
+from leg_wear_monitor.life.life import (
     JumpControl,
     WearRate,
     jump_error,

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, SimulationError
-from leg_wear_monitor.dynamics.batch import Leg
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
-from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.simulation import Leg, prepare
 from leg_wear_monitor.life import life as life_module
-from leg_wear_monitor.life.jumps import JumpControl
-from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.life import JumpControl, LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import pressure_speed
 
 SHORT = LifeSettings(legs=2, cycles=3, settle_cycles=1)

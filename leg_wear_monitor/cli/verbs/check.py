@@ -16,8 +16,7 @@ from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, ex
 from leg_wear_monitor.files import json_text, package_version, share_directory
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.mechanism.materials import Material
-    from leg_wear_monitor.mechanism.sourced import Drive, SourcedValue
+    from leg_wear_monitor.mechanism.materials import Drive, Material, SourcedValue
     from leg_wear_monitor.monitor.config.settings import DriveParameters
 
 
@@ -207,7 +206,7 @@ def _mechanism(name: str) -> str:
 
     leg = load_mechanism(name)
     with common.compilation():
-        from leg_wear_monitor.contact.conformity import conformity_doubts
+        from leg_wear_monitor.contact.geometry import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage

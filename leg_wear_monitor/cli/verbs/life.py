@@ -90,8 +90,7 @@ def _lives(
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.jumps import JumpControl
-    from leg_wear_monitor.life.life import LifeSettings, check_life, simulate_lives
+    from leg_wear_monitor.life.life import JumpControl, LifeSettings, check_life, simulate_lives
     from leg_wear_monitor.life.result import Duty
     from leg_wear_monitor.mechanism.materials import check_wear_is_known
 

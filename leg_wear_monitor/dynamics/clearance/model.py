@@ -17,10 +17,15 @@ from leg_wear_monitor.compiled.vectors import (
     vector_at,
 )
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.basis import motion_shapes, start_of, views
-from leg_wear_monitor.dynamics.clearance.contact import ADDED, TO_ANGLE, VECTORS, fresh_sample
-from leg_wear_monitor.dynamics.clearance.contact_system import ContactSystem, contact_system
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
+from leg_wear_monitor.dynamics.clearance.contact import (
+    ADDED,
+    TO_ANGLE,
+    VECTORS,
+    ContactSystem,
+    contact_system,
+    fresh_sample,
+)
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, motion_shapes, start_of, views
 from leg_wear_monitor.dynamics.run import JOINT_RATES
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 

@@ -42,10 +42,11 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     V1,
     VM,
     accelerate_clearances,
+    factorise_contacts,
     joint_forces,
+    solve_contacts,
     take_directions,
 )
-from leg_wear_monitor.dynamics.clearance.contact_system import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.clearance.model import (
     ACCELERATION,
     ANGLE,

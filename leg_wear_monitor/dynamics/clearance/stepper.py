@@ -12,14 +12,6 @@ from leg_wear_monitor.compiled.kernel import compile_for
 from leg_wear_monitor.compiled.vectors import padded
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
-from leg_wear_monitor.dynamics.clearance.basis import (
-    COARSER,
-    Basis,
-    is_damped,
-    motion_shapes,
-    stored_shapes,
-    views,
-)
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
@@ -39,10 +31,16 @@ from leg_wear_monitor.dynamics.clearance.model import (
     state_shapes,
 )
 from leg_wear_monitor.dynamics.clearance.tables import (
+    COARSER,
     UNDER_LOAD,
+    Basis,
     ClearanceTables,
     build_basis,
     build_tables,
+    is_damped,
+    motion_shapes,
+    stored_shapes,
+    views,
 )
 from leg_wear_monitor.dynamics.joint import F_N, F_T, SAMPLE
 from leg_wear_monitor.dynamics.run import (

@@ -9,7 +9,7 @@ import attrs
 from leg_wear_monitor.configuration import USUAL, described, quantity
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.drive import DriveFigures
-from leg_wear_monitor.mechanism.sourced import LIBRARY, Drive, load_drive
+from leg_wear_monitor.mechanism.materials import LIBRARY, Drive, load_drive
 from leg_wear_monitor.mechanism.spec import USUAL_WEAR, WEAR_SLIP
 from leg_wear_monitor.monitor.config.inputs import (
     LIVE,

@@ -46,9 +46,9 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 )
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
+from leg_wear_monitor.twin.references import ReferenceSnapshot, TorqueReference
 from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
-from leg_wear_monitor.twin.torque_reference import ReferenceSnapshot, TorqueReference
 
 _LOG = logging.getLogger(__name__)
 

@@ -16,7 +16,7 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.twin.reference import COUPLING_DAMPING, HARMONICS, POINTS, CrankProfile, LegParameters
-from leg_wear_monitor.twin.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
 
 FORMAT = 2  # 1, without a number, had one reference of a leg as its file is

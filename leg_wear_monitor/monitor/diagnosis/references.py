@@ -28,7 +28,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import FIRST_CYCLES, SignedCycle, TorqueState
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_profile
-from leg_wear_monitor.twin.torque_reference import (
+from leg_wear_monitor.twin.references import (
     CADENCES,
     LEAST_CLEARANCE_M,
     ReferenceSnapshot,

@@ -24,6 +24,7 @@ from leg_wear_monitor.twin.reference import (
     LegParameters,
     mean_profile,
 )
+from leg_wear_monitor.twin.references import TorqueReference
 from leg_wear_monitor.twin.sample import (
     GAIT_SAMPLE,
     Samples,
@@ -32,7 +33,6 @@ from leg_wear_monitor.twin.sample import (
     newest,
     of_crank,
 )
-from leg_wear_monitor.twin.torque_reference import TorqueReference
 
 # Samples of the crank and of the drive torque, kept until their gait cycle ends.
 

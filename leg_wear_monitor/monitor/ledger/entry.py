@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.torque_reference import TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 from leg_wear_monitor.wear import SECTORS
 
 _CLASS_N = 100  # resolution of foot loads

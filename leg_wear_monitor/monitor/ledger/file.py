@@ -40,7 +40,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     VerdictEvent,
 )
 from leg_wear_monitor.twin.reference import UNLIKE
-from leg_wear_monitor.twin.torque_reference import CADENCES
+from leg_wear_monitor.twin.references import CADENCES
 
 FORMAT = 1  # PRAGMA user_version
 _APPLICATION_ID = 0x4C574D31  # "LWM1"

@@ -8,8 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials import Material
-from leg_wear_monitor.mechanism.sourced import UNITS, SourcedValue, WearCoefficient
+from leg_wear_monitor.mechanism.materials import UNITS, Material, SourcedValue, WearCoefficient
 
 
 def wear(value: float, unit: str, hardness: SourcedValue | None = None) -> float:

@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.angle_regression import (
 )
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.encoders import commissioned, errors_of, prior_with
-from leg_wear_monitor.twin.angle_reference import (
+from leg_wear_monitor.twin.reference import HARMONICS, CrankProfile, even_angles, worn_to
+from leg_wear_monitor.twin.references import (
     PHASES,
     AngleReference,
     AngleReferenceRun,
@@ -25,7 +26,6 @@ from leg_wear_monitor.twin.angle_reference import (
     at_phases,
     design,
 )
-from leg_wear_monitor.twin.reference import HARMONICS, CrankProfile, even_angles, worn_to
 
 SENSORS = ("B", "G", "I")  # hip, knee, ankle
 FRESH = np.full(5, 3e-4)

@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.encoders import errors_of
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.monitor.ledger.file import read as read_records
 from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin.angle_reference import PHASES, AngleReferenceRun, angle_model
+from leg_wear_monitor.twin.references import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import EMPTY
 
 NAMES, JOINTS = ("hip", "knee", "ankle"), ("B", "G", "I")

@@ -37,7 +37,7 @@ from leg_wear_monitor.monitor.ledger.file import FORMAT, LedgerError, read
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
 from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
-from leg_wear_monitor.twin.torque_reference import CYCLES, TorqueReference
+from leg_wear_monitor.twin.references import CYCLES, TorqueReference
 
 SECOND = 10**9
 

@@ -9,7 +9,7 @@ from leg_wear_monitor.compiled.kernel import Record, new_records, record_of
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.cycle import INSTANT_CYCLES, LoadEstimate, RepeatingResidual, find
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.follower_state import (
+from leg_wear_monitor.twin.following import (
     FRICTION,
     LAG,
     LOAD,

@@ -14,8 +14,7 @@ from leg_wear_monitor.gait.leg import POINTS, Ground
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
-from leg_wear_monitor.twin.sample import REORDER_WINDOW_S, Samples, TrackerSettings, gait_samples
-from leg_wear_monitor.twin.steps import (
+from leg_wear_monitor.twin.crank_motion import (
     EVALUATE,
     LEAVE,
     LOST_BY_JUMP,
@@ -32,6 +31,7 @@ from leg_wear_monitor.twin.steps import (
     STOPPED,
     Steps,
 )
+from leg_wear_monitor.twin.sample import REORDER_WINDOW_S, Samples, TrackerSettings, gait_samples
 from leg_wear_monitor.twin.tracker import CrankTracker
 
 START_NS = 1_700_000_000_123_456_789

@@ -1,15 +1,99 @@
-"""Normal contact laws by name (physics.md section 4).
+"""Contact laws by name: Coulomb friction with a ramp, and the normal force (physics.md section 4).
 
-To add a law, add its kernels here and an entry to `LAWS`.
+To add a law, add its kernel here, an entry of `RAMPS` or `LAWS`, and its name to `FRICTION_LAWS` or
+`NORMAL_LAWS` of `mechanism`.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest, root, where
-from leg_wear_monitor.contact.by_number import by_number
+
+# A kernel that selects one of several kernels by a number in compiled code.
+
+
+def by_number(kernels: Iterable[Callable[..., Any]]) -> Callable[..., Any]:
+    """Kernel that takes the number of a kernel, from 0, then the arguments of this kernel.
+
+    It is a chain of branches, built once: compiled code cannot cheaply call a function that is an argument.
+    """
+    *others, last = kernels
+    chain = _only(last)
+    for number, this in reversed(list(enumerate(others))):
+        chain = _either(number, this, chain)
+    return chain
+
+
+def _only(this: Callable[..., Any]) -> Callable[..., Any]:
+    """Kernel that calls ``this`` for any number."""
+
+    @kernel
+    def only(number, *arguments):
+        return this(*arguments)
+
+    return only
+
+
+def _either(number: int, this: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
+    """Kernel that calls ``this`` for one number, and ``others`` for any other."""
+
+    @kernel
+    def either(given, *arguments):
+        if given == number:
+            return this(*arguments)
+        return others(given, *arguments)
+
+    return either
+
+
+# Coulomb friction with a ramp around zero slip speed.
+
+
+@kernel
+def no_ramp(speed, v0, v1):
+    """No friction."""
+    return 0.0
+
+
+@kernel
+def ambrosio_ramp(speed, v0, v1):
+    """Fraction c_d [-] of Coulomb's friction: 0 up to v0, 1 from v1, linear between [m/s] (Ambrosio 2003).
+
+    The arguments are numbers or vectors.
+    """
+    return where(speed > v0, where(speed < v1, (speed - v0) / largest(v1 - v0, LEAST_DIVISOR), 1.0), 0.0)
+
+
+@kernel
+def threlfall_ramp(speed, v0, v1):
+    """Fraction [-] of Coulomb's friction, 1 - exp(-3 |v| / v1): 95 % at v1 [m/s] (Threlfall 1978)."""
+    return 1.0 - math.exp(-3.0 * speed / v1)
+
+
+RAMPS = {"none": no_ramp, "ambrosio": ambrosio_ramp, "threlfall": threlfall_ramp}
+"""Kernel of each law: fraction of Coulomb's friction from slip speed and both speeds of the ramp [m/s]."""
+
+FRICTION_CODES = {name: number for number, name in enumerate(RAMPS)}
+NONE = FRICTION_CODES["none"]
+VECTOR_LAWS = (NONE, FRICTION_CODES["ambrosio"])
+"""Laws that vectors of joints compute; every other law is computed joint by joint."""
+
+_fraction = by_number(RAMPS.values())
+
+
+@kernel
+def friction_force(law, coefficient, v0, v1, f_n, slip):
+    """Tangential force [N] on the journal, opposite to the slip speed [m/s]; f_n the normal force [N]."""
+    return against(slip, coefficient * _fraction(law, abs(slip), v0, v1) * f_n)
+
+
+@kernel
+def against(slip, force):
+    """A force [N] opposite to the slip speed. The arguments are numbers or vectors."""
+    return where(slip < 0.0, force, -force)
+
 
 # Interface of a normal contact law to the equations of motion (physics.md section 4).
 

@@ -1,11 +1,10 @@
 """Statistics of a gait cycle from its sums."""
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
+from leg_wear_monitor.dynamics.run import ARCHARD, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.following import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS
 from leg_wear_monitor.twin.sample import LOADS_N
@@ -36,23 +35,10 @@ _SUDDEN = 3.0  # a deviation of this many standard deviations counts as a sudden
 _ACTS_ABOVE, _CEASES_BELOW = 3.0, 2.0  # standard deviations from 0 at which a load begins and ceases to act
 
 
-@attrs.frozen(eq=False)
-class CycleEstimate:
-    """Estimate of one cycle: values (4,), standard deviations (4,), condition number, RMS residual [N m].
-
-    ``left`` is the residual for values within their bounds; ``values`` are not bounded.
-    """
-
-    values: Floats
-    sigma: Floats
-    condition: float
-    left: float
-
-
 def find(
     sums: Record, correlated: float, loads: tuple[float, float] = (-np.inf, np.inf)
-) -> CycleEstimate | None:
-    """Least-squares estimate from the sums of a cycle.
+) -> tuple[Floats, Floats, float] | None:
+    """Least-squares estimate of the four parameters from the sums of a cycle.
 
     Parameters
     ----------
@@ -65,9 +51,10 @@ def find(
 
     Returns
     -------
-    CycleEstimate or None
-        None without enough samples. For a mechanism without a toe, the load is 0 with a standard deviation of
-        0. The condition number is that of the normalised regressors, 1 if they are orthogonal.
+    values, sigma, left : (4,) array, (4,) array and float, or None
+        Values, which are not bounded, their standard deviations, and the RMS residual [N m] of values within
+        their bounds; None without enough samples. For a mechanism without a toe, the load is 0 with a
+        standard deviation of 0.
     """
     gram, along = sums.gram, sums.along
     scale = np.sqrt(np.diag(gram))
@@ -75,8 +62,7 @@ def find(
     if sums.number < LEAST_SAMPLES or not active[FRICTION]:
         return None
     scaled = gram[np.ix_(active, active)] / np.outer(scale[active], scale[active])
-    condition = float(np.linalg.cond(scaled)) ** 0.5
-    if not condition < 1.0 / _SMALL:
+    if not float(np.linalg.cond(scaled)) ** 0.5 < 1.0 / _SMALL:
         return None
     inverse = np.linalg.inv(scaled) / np.outer(scale[active], scale[active])
     values, sigma = np.zeros(REGRESSORS), np.zeros(REGRESSORS)
@@ -85,7 +71,7 @@ def find(
     square = float(sums.residual_squares - 2.0 * likely @ along + likely @ gram @ likely)
     left = max(square, 0.0) / sums.weight
     sigma[active] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
-    return CycleEstimate(values, sigma, condition, float(left**0.5))
+    return values, sigma, float(left**0.5)
 
 
 def bounded(gram: Floats, along: Floats, low: Floats, high: Floats) -> Floats:
@@ -154,16 +140,16 @@ class LoadEstimate:
         """Least and largest possible load minus the acting one [N]."""
         return LOADS_N[0] - self.acting, LOADS_N[1] - self.acting
 
-    def take(self, found: CycleEstimate, acts: bool) -> None:
-        """Update by a cycle's estimate; ``acts``: whether a significant load acts on the leg."""
+    def take(self, found: Floats, sigma: Floats, acts: bool) -> None:
+        """Update by a cycle's estimate (4,); ``acts``: whether a significant load acts on the leg."""
         values, variance = self.values, self.state[REGRESSORS:-1]
-        measured = found.values.copy()
+        measured = found.copy()
         measured[LOAD] += self.acting
         variance += _DRIFT**2
         surprise = measured - values
-        sudden = surprise**2 > _SUDDEN**2 * (variance + found.sigma**2)
+        sudden = surprise**2 > _SUDDEN**2 * (variance + sigma**2)
         variance += np.where(sudden, surprise**2, 0.0)
-        gain = variance / (variance + found.sigma**2 + _SMALL)
+        gain = variance / (variance + sigma**2 + _SMALL)
         values += gain * surprise
         variance *= 1.0 - gain
         values[LOAD] = np.clip(values[LOAD], *LOADS_N)
@@ -185,25 +171,17 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
     return np.stack([contacts.clearance + opened.mean(axis=1), contacts.clearance + opened.max(axis=1)])
 
 
-def torque_statistics(
-    sums: Record, found: CycleEstimate | None, settled: LoadEstimate, unexplained_nm: float
-) -> TorqueStatistics:
+def torque_statistics(sums: Record, settled: LoadEstimate, unexplained_nm: float) -> TorqueStatistics:
     """Torque statistics of one cycle.
 
     Parameters
     ----------
     sums : Record
         `TORQUE_SUMS` of the cycle.
-    found : CycleEstimate or None
-        Least-squares estimate of this cycle alone.
     settled : LoadEstimate
         Estimate filtered over cycles.
     unexplained_nm : float
         RMS of the unexplained residual over the last cycles that were compared.
-
-    Returns
-    -------
-    TorqueStatistics
     """
     n, weight = int(sums.number), sums.weight
 
@@ -217,7 +195,6 @@ def torque_statistics(
         predicted_rms_nm=rms(sums.predicted_squares),
         residual_rms_nm=rms(sums.residual_squares),
         unexplained_rms_nm=unexplained_nm,
-        condition=found.condition if found else np.nan,
         load_n=load,
         load_sigma_n=float(settled.sigma[LOAD]),
         load_acting_n=settled.acting,
@@ -266,7 +243,6 @@ def cycle_statistics(
         p99_force_n=np.array([percentile(statistics.force_time[j], 0.99) for j in joint]),
         mean_force_n=statistics.integral[joint, FORCE] / moving,
         impacts=statistics.impacts[joint],
-        contact_fraction=statistics.integral[joint, CONTACT] / moving,
         archard_j=statistics.integral[joint, ARCHARD],
         clearance_mean_m=now[0],
         clearance_max_m=now[1],

@@ -349,7 +349,7 @@ class DigitalTwin:
     ) -> SampleStatistics:
         """Follow n steps; append finished gait cycles and events; returns statistics of the samples."""
         i, m = 0, 0
-        room = evaluated, forces, eccentricities = self._room(n)
+        room = evaluated, forces = self._room(n)
         while i < n:
             reason, i, k, m = follow(
                 self._advance_address, self._stepper.model, self._setup.surfaces.feeds_back,
@@ -372,13 +372,11 @@ class DigitalTwin:
         stamp, kind, angle, torque, measured = (
             evaluated[name][:m] for name in following.EVALUATED.names or ()
         )
-        at = eccentricities[:m].reshape(m, forces.shape[1], 2)
-        return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured, at)
+        return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured)
 
-    def _room(self, n: int) -> tuple[Records, Floats, Floats]:
-        """Room for n samples: `EVALUATED`, contact forces (n, k) [N], and eccentricities (n, 2 k) [m]."""
-        joints = len(self.clearance_joints)
-        return new_records(n, following.EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
+    def _room(self, n: int) -> tuple[Records, Floats]:
+        """Room for n samples: `EVALUATED`, and contact forces (n, k) [N]."""
+        return new_records(n, following.EVALUATED), np.zeros((n, len(self.clearance_joints)))
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion at the begin of step i, with its wear unchanged; returns the event."""
@@ -481,13 +479,12 @@ class DigitalTwin:
         profile = attrs.evolve(profile, predicted_nm=profile.predicted_nm + profile.number * step_nm)
         found = cycle.find(sums, sums.number / independent, self.estimate.room)
         if found is not None:
-            self.estimate.take(found, self._acts)
+            self.estimate.take(*found[:2], self._acts)
             self._load.set(self.estimate.acting)
             self._set_friction()
         if found is not None and is_compared:
             self._repeating.take(self._by_phase(profile, acting_n, step_nm))
-        torque = cycle.torque_statistics(sums, found, self.estimate, self._unexplained_nm)
-        return torque, profile
+        return cycle.torque_statistics(sums, self.estimate, self._unexplained_nm), profile
 
     def _step_torque(self) -> Floats:
         """Torque (FINE_PHASES,) of the measured load of this gait cycle less the mean that acted [N m]."""

@@ -511,13 +511,11 @@ def follow(
     m,
     evaluated,
     forces,
-    eccentricities,
 ):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the FollowerState.
 
     ``sensors`` (1,) contains the torque sensor, ``load`` the `LoadRows`. Values at samples are written to
-    ``evaluated`` (n,) from index m on, joint forces [N] to ``forces`` (n, k) and eccentricities [m] to
-    ``eccentricities`` (n, 2 k), NaN while the leg does not run.
+    ``evaluated`` (n,) from index m on, joint forces [N] to ``forces`` (n, k), NaN while the leg does not run.
 
     Returns
     -------
@@ -574,8 +572,6 @@ def follow(
                 _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
             for j in range(force.shape[0]):
                 forces[m, j] = force[j] if motion.runs != 0 else math.nan
-            for j in range(stepper.e.shape[0]):
-                eccentricities[m, j] = stepper.e[j] if motion.runs != 0 else math.nan
             m += 1
         elif code == PUSH:
             if motion.runs != 0:

@@ -64,8 +64,6 @@ class SampleStatistics:
         Forces in the clearance joints at the sample.
     measured_torque_nm : (n,) array
         Drive torque of the sample, also while tracking is lost; NaN without one.
-    eccentricity_m : (n, k, 2) array
-        Centre of each journal from the centre of its bushing, in the plane of the leg.
     """
 
     stamp_ns: Ints
@@ -74,7 +72,6 @@ class SampleStatistics:
     predicted_torque_nm: Floats
     contact_force_n: Floats
     measured_torque_nm: Floats
-    eccentricity_m: Floats
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
@@ -96,13 +93,11 @@ class TorqueStatistics:
     Attributes
     ----------
     samples : int
-        Number of compared torque samples; if 0, all values up to ``condition`` are NaN.
+        Number of compared torque samples; if 0, the four values below are NaN.
     measured_rms_nm, predicted_rms_nm, residual_rms_nm : float
     unexplained_rms_nm : float
         RMS of the residual that repeats over the last compared gait cycles, without the parts of foot load,
         frictions and lag and without the scatter from cycle to cycle: the error of the model.
-    condition : float
-        Condition number of this cycle's estimate of the four parameters below, 1 at best.
     load_n, load_sigma_n : float
         Vertical foot load, positive upwards, and its standard deviation.
     load_acting_n : float
@@ -122,7 +117,6 @@ class TorqueStatistics:
     predicted_rms_nm: float
     residual_rms_nm: float
     unexplained_rms_nm: float
-    condition: float
     load_n: float
     load_sigma_n: float
     load_acting_n: float
@@ -207,8 +201,6 @@ class CycleStatistics:
     peak_force_n, p99_force_n, mean_force_n : array
         Statistics of the contact force; the peak is a sample of a heavy tail.
     impacts : array of int
-    contact_fraction : array
-        Fraction of the time in contact.
     archard_j : array
         Integral of ``F_N |v_t| dt``.
     clearance_mean_m, clearance_max_m : array
@@ -235,7 +227,6 @@ class CycleStatistics:
     p99_force_n: Floats
     mean_force_n: Floats
     impacts: Ints
-    contact_fraction: Floats
     archard_j: Floats
     clearance_mean_m: Floats
     clearance_max_m: Floats
@@ -342,7 +333,7 @@ def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleSt
         return parts[0]
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     none, forces = np.zeros(0), np.zeros((0, clearance_joints))
-    empty = SampleStatistics(stamps, stamps, none, none, forces, none, np.zeros((0, clearance_joints, 2)))
+    empty = SampleStatistics(stamps, stamps, none, none, forces, none)
     names = [field.name for field in attrs.fields(SampleStatistics)]
     return SampleStatistics(
         *(np.concatenate([getattr(part, name) for part in parts or (empty,)]) for name in names)

@@ -82,7 +82,6 @@ def test_a_load_is_found_and_moves_the_contact_forces(leg, force, friction):
     assert torque.load_acting_n == (torque.load_n if force else 0.0)
     assert [cycle.load_peak_n for cycle in cycles[1:]] == [one.torque.load_acting_n for one in cycles[:-1]]
     assert torque.unexplained_rms_nm < 0.15 * torque.measured_rms_nm
-    assert torque.condition < 5.0  # 2.8 to 3.7: a torque that rubs has a mean, as a constant friction has
     force_n = np.mean([cycle.mean_force_n for cycle in last], axis=0)
     np.testing.assert_allclose(force_n, wanted, rtol=0.05, atol=1.0)
 

@@ -43,9 +43,8 @@ def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
     angle = np.linspace(0.0, TURN, 200, endpoint=False)
     columns = np.stack([0.1 * np.sin(angle + phase), np.ones(200), 40.0 * np.cos(3.0 * angle)], axis=1)
     found = find(sums_of(columns, columns @ [load, friction, lag]), 10.0)
-    np.testing.assert_allclose(found.values, [load, friction, lag, 0.0], atol=1.0e-9 * 500.0)
-    assert found.condition == pytest.approx(1.0)
-    assert found.left < 1.0e-4
+    np.testing.assert_allclose(found[0], [load, friction, lag, 0.0], atol=1.0e-9 * 500.0)
+    assert found[2] < 1.0e-4
 
 
 @given(
@@ -61,9 +60,10 @@ def test_friction_that_grows_with_the_torque_is_told_from_a_constant_one(
         [0.1 * np.sin(angle), np.ones(200), 10.0 * np.cos(angle + phase), np.abs(torque)], axis=1
     )
     found = find(sums_of(columns, columns @ [load, friction, 0.0, load_friction]), 10.0, (-1e3, 1e3))
-    if found is not None and found.condition < 100.0:  # load and lag are alike at some phases
-        np.testing.assert_allclose(found.values[[1, 3]], [friction, load_friction], atol=1.0e-6)
-        assert found.left < 1.0e-3
+    condition = np.linalg.cond(columns / np.linalg.norm(columns, axis=0))
+    if found is not None and condition < 100.0:  # load and lag are alike at some phases
+        np.testing.assert_allclose(found[0][[1, 3]], [friction, load_friction], atol=1.0e-6)
+        assert found[2] < 1.0e-3
 
 
 def test_a_drive_does_not_gain_from_its_load():
@@ -74,9 +74,9 @@ def test_a_drive_does_not_gain_from_its_load():
     )
     found = find(sums_of(columns, columns @ [0.0, 1.0, 0.0, -1.0]), 1.0)
     mean = 2.0 / np.pi
-    assert found.left == pytest.approx(np.sqrt(0.5 - mean**2), rel=0.01)  # of |sin| about its mean
+    assert found[2] == pytest.approx(np.sqrt(0.5 - mean**2), rel=0.01)  # of |sin| about its mean
     estimate = LoadEstimate()
-    estimate.take(found, True)
+    estimate.take(*found[:2], True)
     assert estimate.values[LOAD_FRICTION] == 0.0
 
 
@@ -84,9 +84,9 @@ def test_without_a_toe_only_friction_and_lag_are_sought():
     angle = np.linspace(0.0, TURN, 50, endpoint=False)
     columns = np.stack([np.zeros(50), np.ones(50), np.cos(angle)], axis=1)
     found = find(sums_of(columns, columns @ [0.0, 2.0, 0.1]), 1.0)
-    np.testing.assert_allclose(found.values, [0.0, 2.0, 0.1, 0.0])
+    np.testing.assert_allclose(found[0], [0.0, 2.0, 0.1, 0.0])
     estimate = LoadEstimate()
-    estimate.take(found, True)
+    estimate.take(*found[:2], True)
     assert estimate.acting == 0.0
 
 
@@ -104,7 +104,7 @@ def test_a_sudden_load_is_believed_soon_and_a_doubtful_one_not():
         columns[:, LOAD] = 0.1 * np.sin(np.arange(200) * TURN / 200)
         columns[:, FRICTION], columns[:, LAG] = 1.0, np.cos(np.arange(200) * 3.0 * TURN / 200)
         residual = columns @ [load - estimate.acting, 0.0, 0.0] + sigma * chance.standard_normal(200)
-        estimate.take(find(sums_of(columns, residual), 10.0), True)
+        estimate.take(*find(sums_of(columns, residual), 10.0)[:2], True)
 
     for _ in range(20):
         take(1.0, 1.0)
@@ -125,7 +125,7 @@ def test_a_foot_that_pulls_is_not_explained_by_a_load():
     assert bounded.left == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-6)
     np.testing.assert_allclose(bounded.values, [-50.0, 1.5, 0.001, 0.0], rtol=1e-9)
     estimate = LoadEstimate()
-    estimate.take(bounded, True)
+    estimate.take(*bounded[:2], True)
     assert estimate.values[0] == estimate.acting == 0.0
     assert estimate.room == (0.0, 1000.0)
 

@@ -390,11 +390,11 @@ def first_diagnosis(name: str, walks: dict[str, np.ndarray], options, random) ->
     else:
         return [str(estimate), "never", f"{spent:.0f}", " → ".join(misfits), str(state.rounds), found.reason]
     row = [str(estimate), str(cycle), f"{spent:.0f}", " → ".join(misfits), str(state.rounds)]
-    then, named = observer.snapshot(), []
+    then, named = attrs.evolve(observer.state), []
     for case in walks:
         if case.partition(" ")[2] not in ("0.36", "1.00"):
             continue
-        observer.restore(then)
+        observer.go_on_from(then)
         samples, after = received(walks[case], AFTER, cycle, options, random), 0
         for found in observed(observer, leg, samples, cycle):
             after += 1

@@ -302,10 +302,10 @@ def main() -> None:
             before = COMMISSIONED + WARM // 2
             order = [i % healthy.shape[1] for i in range(before)]
             one, found = watched(leg, size, warming(healthy, order))
-            commissioned = one.snapshot()
+            commissioned = attrs.evolve(one.state)
             for joint, size_mm, number in OPENINGS:
                 worn = cycles_of(walk(stiffness, joint, size_mm, number), DRIVES[name], sensor, 6)
-                one.restore(commissioned)
+                one.go_on_from(commissioned)
                 rows = warming(worn, list(range(worn.shape[1])), before)
                 one, found = watched(leg, size, rows, one, before)
                 seen, k = one.diagnosis, leg.clearance_joints.index(joint)

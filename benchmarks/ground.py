@@ -197,10 +197,10 @@ def main() -> None:
                 f"{channel.load_friction:.2f}; misfit {off:.2f}; {summary(found) or 'nothing found'}",
                 flush=True,
             )
-            commissioned, parameters = one.snapshot(), one.parameters
+            commissioned, parameters = attrs.evolve(one.state), one.parameters
             for joint, size_mm in OPENINGS:
                 rows = list(cycles_of(walk(peak_n, joint, size_mm).rows, drive, sensor, 6)[0])
-                one.restore(commissioned)
+                one.go_on_from(commissioned)
                 one, found = watched(leg, size, rows, one, BEFORE)
                 seen, k = one.diagnosis, leg.clearance_joints.index(joint)
                 value = (
@@ -209,7 +209,7 @@ def main() -> None:
                     else "-"
                 )
                 print(f"  {joint} {size_mm:g}: {when(found, BEFORE)}; {value}", flush=True)
-            one.restore(commissioned)
+            one.go_on_from(commissioned)
             rows = drawn(cycles, round(3600 * options.hours))
             one, found = watched(leg, size, rows, one, BEFORE)
             print(f"  healthy, {options.hours:g} h: {summary(found) or 'none'}", flush=True)

@@ -44,7 +44,8 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import references
-from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import LegParameters
@@ -198,18 +199,16 @@ class Monitored:
     ----------
     leg : Mechanism
         Mechanism as in its file.
-    snapshot : TorqueObserverSnapshot, optional
-        Snapshot of the observer after some gait cycles.
+    state : TorqueState, optional
+        State of the observer after some gait cycles.
     cycle : int
         Their number.
     """
 
-    def __init__(
-        self, leg: Mechanism, snapshot: TorqueObserverSnapshot | None = None, cycle: int = 0
-    ) -> None:
+    def __init__(self, leg: Mechanism, state: TorqueState | None = None, cycle: int = 0) -> None:
         self.observer = TorqueObserver(leg, MonitorConfig(), torque_size(build_linkage(leg), TURN), NEW)
-        if snapshot is not None:
-            self.observer.restore(snapshot)
+        if state is not None:
+            self.observer.go_on_from(state)
         self.joints, self.cycle, self.counted = leg.clearance_joints, cycle, NEW.copy()
         self.end_ns = cycle * 10**9
         self.found: dict[str, list[int]] = {}  # gait cycles of each finding
@@ -333,7 +332,7 @@ def main() -> None:
         part = functools.partial(received, motor=motor, drive=case.drive)
         for first in range(0, READY, PIECE):
             one.add(*part(walk(turns, "", 0.3), first=first, cycles=PIECE, seed=first))
-        then = one.observer.snapshot()
+        then = attrs.evolve(one.observer.state)
         for first in range(READY, READY + round(3600 * options.hours), PIECE):
             one.add(*part(walk(turns, "", 0.3), first=first, cycles=PIECE, seed=first))
         swapped = Monitored(leg, then, READY)

@@ -4,7 +4,6 @@ References are built from simulated legs: they hold the sensor signals of a leg 
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -321,21 +320,6 @@ def simulate_cycles(
     return DONE
 
 
-class SimulatedLeg(NamedTuple):
-    """Drive torque and eccentricities of a simulated leg, at equal steps of time of a gait cycle.
-
-    Attributes
-    ----------
-    torque : (cycles, POINTS) array
-        Mean torque between them [N m].
-    eccentricity : (POINTS, k, 2) array
-        Mean over the gait cycles at the end of each step [m].
-    """
-
-    torque: Floats
-    eccentricity: Floats
-
-
 class LegSimulation:
     """Simulates legs without wear, one after the other.
 
@@ -359,7 +343,7 @@ class LegSimulation:
         settling: int,
         cycles: int,
         wanted: Callable[[], bool] = lambda: True,
-    ) -> SimulatedLeg | None:
+    ) -> tuple[Floats, Floats] | None:
         """Simulate a leg from the start.
 
         Parameters
@@ -378,8 +362,11 @@ class LegSimulation:
 
         Returns
         -------
-        SimulatedLeg or None
-            None if it cannot be simulated, or is not wanted any more.
+        torque : (cycles, POINTS) array
+            Mean drive torque [N m] between equal steps of time of a gait cycle.
+        eccentricity : (POINTS, k, 2) array
+            Mean over the gait cycles at the end of each step [m]. The result is None if the leg cannot be
+            simulated, or is not wanted any more.
 
         Raises
         ------
@@ -411,7 +398,7 @@ class LegSimulation:
                 return None
         if not np.abs(torque).max() < np.finfo(np.float16).max:  # the stored value; it may be NaN
             return None
-        return SimulatedLeg(torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles)
+        return torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles
 
     def _each_under_its_load(self, load: Floats, cycles: int) -> Iterator[int]:
         """Number of each gait cycle, whose load, if there is one, acts on the leg then.

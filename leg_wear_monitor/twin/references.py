@@ -31,7 +31,6 @@ from leg_wear_monitor.twin.reference import (
     CrankProfile,
     LegParameters,
     LegSimulation,
-    SimulatedLeg,
     even_angles,
 )
 
@@ -40,18 +39,8 @@ CADENCES = 6  # cadences whose references of a leg are kept
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
 _PERIODS = 4  # evaluation periods in a commanded gait cycle
-SIM_CYCLES_PER_PERIOD = (
-    8  # simulated gait cycles in an evaluation period, a quarter cycle; a core does half as many more
-)
-CLEARANCE_FACTORS = (
-    1.2,
-    1.35,
-    1.5,
-    2.0,
-    3.0,
-    5.0,
-    8.0,
-)  # factors on the expected clearance, one joint at a time
+SIM_CYCLES_PER_PERIOD = 8  # in an evaluation period, a quarter gait cycle; a core does half as many more
+CLEARANCE_FACTORS = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # on the expected clearance, one joint at a time
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over its new one, and a factor on the other clearances
 
@@ -149,20 +138,11 @@ class TorqueReference:
 
 
 class Leg(NamedTuple):
-    """A leg to be simulated: its parameters, and its clearances (k,) [m]."""
+    """A leg to be simulated: its parameters, its clearances (k,) [m], and its gait cycles that count."""
 
     parameters: LegParameters
     clearance_m: Floats
-
-
-class ReferenceSnapshot(NamedTuple):
-    """State of a `ReferenceRun`; plain arrays and numbers."""
-
-    profile: CrankProfile
-    legs: tuple[Leg, ...]
-    depth: Floats
-    done: tuple[NDArray[Any], ...]
-    periods: int
+    cycles: int
 
 
 class ReferenceRun(Generic[FoundT]):
@@ -171,6 +151,9 @@ class ReferenceRun(Generic[FoundT]):
     Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: its result
     depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
     as many threads as numba may use (NUMBA_NUM_THREADS).
+
+    A subclass has the number ``pace`` of simulated gait cycles in an evaluation period. Its ``_stored`` gives
+    the part of a simulated leg that it needs, and ``_so_far`` the reference by these parts.
 
     Parameters
     ----------
@@ -184,6 +167,7 @@ class ReferenceRun(Generic[FoundT]):
     """
 
     may_be_late = False
+    pace: int
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
@@ -201,17 +185,8 @@ class ReferenceRun(Generic[FoundT]):
         """The reference by the legs that are simulated."""
         raise NotImplementedError
 
-    def _kept(self, leg: SimulatedLeg) -> NDArray[Any]:
-        """Part of a simulated leg that the reference stores."""
-        raise NotImplementedError
-
-    def _cycles_of(self, leg: Leg) -> int:
-        """Gait cycles of a leg that count."""
-        raise NotImplementedError
-
-    @property
-    def _pace(self) -> int:
-        """Simulated gait cycles in an evaluation period."""
+    def _stored(self, torque: Floats, eccentricity: Floats) -> NDArray[Any]:
+        """Part of a leg's torque or eccentricities, as of `LegSimulation.simulate`, that is kept."""
         raise NotImplementedError
 
     @property
@@ -227,17 +202,17 @@ class ReferenceRun(Generic[FoundT]):
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return min(1.0, self._pace * self._periods / max(1, self._cost(self._legs)))
+        return min(1.0, self.pace * self._periods / max(1, self._cost(self._legs)))
 
     @property
     def is_late(self) -> bool:
         """True if all legs are due, but not all are simulated."""
-        return self.is_busy and self._cost(self._legs) <= self._pace * self._periods
+        return self.is_busy and self._cost(self._legs) <= self.pace * self._periods
 
     @property
     def cycles_left(self) -> float:
         """Commanded gait cycles until all legs are due."""
-        periods = -(-self._cost(self._legs) // self._pace) - self._periods
+        periods = -(-self._cost(self._legs) // self.pace) - self._periods
         return max(0, periods) / _PERIODS
 
     def advance(self, waits: bool = False) -> FoundT | None:
@@ -249,7 +224,7 @@ class ReferenceRun(Generic[FoundT]):
         if not self.is_busy:
             return None
         self._periods += 1
-        is_due = self._cost(self._legs) <= self._pace * self._periods
+        is_due = self._cost(self._legs) <= self.pace * self._periods
         can = self._take(waits or (is_due and not self.may_be_late))
         if not can and (is_due or self.may_be_late):
             self._begin((), self._depth, self._profile)
@@ -266,16 +241,6 @@ class ReferenceRun(Generic[FoundT]):
             progress(self.progress)
         return found
 
-    def snapshot(self) -> ReferenceSnapshot:
-        """The whole state; legs that are simulated ahead are simulated again."""
-        self._take(waits=True)
-        return ReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
-
-    def restore(self, snapshot: ReferenceSnapshot) -> None:
-        """Restore a snapshot of a run of the same mechanism; it continues bit for bit."""
-        self._begin(snapshot.legs, snapshot.depth, snapshot.profile)
-        self._done, self._periods = snapshot.done, snapshot.periods
-
     def leave(self) -> None:
         """Let the threads stop simulating ahead, because a program's end would wait for them.
 
@@ -285,16 +250,19 @@ class ReferenceRun(Generic[FoundT]):
             one.cancel()
         self._ahead, self._wanted = [], object()
 
-    def _begin(self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile) -> None:
+    def _begin(
+        self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile, done: Sequence[NDArray[Any]] = ()
+    ) -> None:
+        """Begin to simulate legs, the first of which may be simulated already."""
         self.leave()
-        self._periods = 0
-        self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
+        self._legs, self._depth, self._profile = tuple(legs), depth.copy(), profile
+        self._done, self._periods = tuple(done), -(-self._cost(legs[: len(done)]) // self.pace)
 
     @property
     def _due(self) -> int:
         """Number of legs that are due."""
-        costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
-        return int(np.searchsorted(costs, self._pace * self._periods, side="right"))
+        costs = np.cumsum([_SETTLING + leg.cycles for leg in self._legs])
+        return int(np.searchsorted(costs, self.pace * self._periods, side="right"))
 
     def _take(self, waits: bool) -> bool:
         """Take the legs that are due and simulated, or wait for them, up to one that cannot be.
@@ -315,17 +283,15 @@ class ReferenceRun(Generic[FoundT]):
         simulated = len(self._done) + sum(one.done() for one in self._ahead)
         first = len(self._done) + len(self._ahead)
         for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
-            cycles = self._cycles_of(leg)
-            self._ahead.append(
-                self._pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth, cycles)
-            )
+            job = self._pool.submit(self._simulated, self._wanted, self._profile, leg, self._depth)
+            self._ahead.append(job)
 
     def _cost(self, legs: Sequence[Leg]) -> int:
         """Gait cycles simulated for some legs, including the cycles in which they settle."""
-        return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
+        return sum(_SETTLING + leg.cycles for leg in legs)
 
     def _simulated(
-        self, wanted: object, profile: CrankProfile, leg: Leg, depth: Floats, cycles: int
+        self, wanted: object, profile: CrankProfile, leg: Leg, depth: Floats
     ) -> NDArray[Any] | None:
         """Stored part of a leg; None if it cannot be simulated, or is not wanted any more."""
         own = self._of_thread
@@ -333,12 +299,12 @@ class ReferenceRun(Generic[FoundT]):
             own.simulation = LegSimulation(self._mechanism)
         try:
             found = own.simulation.simulate(
-                profile, leg.parameters, leg.clearance_m, depth, _SETTLING, cycles,
+                profile, leg.parameters, leg.clearance_m, depth, _SETTLING, leg.cycles,
                 lambda: self._wanted is wanted,
             )  # fmt: skip
         except AssemblyError:  # the linkage does not close with such lengths
             return None
-        return None if found is None else self._kept(found)
+        return None if found is None else self._stored(*found)
 
 
 class TorqueReferenceRun(ReferenceRun[TorqueReference]):
@@ -348,10 +314,12 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     ----------
     mechanism : Mechanism
     cycles : int, optional
-        Gait cycles of each wider leg; default: CYCLES.
+        Gait cycles of each leg but the first, the expected one, which has twice as many.
     """
 
-    def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
+    pace = SIM_CYCLES_PER_PERIOD
+
+    def __init__(self, mechanism: Mechanism, cycles: int = CYCLES) -> None:
         super().__init__(mechanism)
         self._cycles = cycles
         joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
@@ -382,20 +350,28 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         # no clearance is wider than its journal is thick; a worn joint may have got a new part without a word
         widest, is_worn = 0.5 * self._radius, centre > WORN * self._fresh
         narrower = np.where(is_worn, self._fresh, NARROWER * centre)
-        legs = [Leg(parameters, centre)]
+        legs = [(parameters, centre)]
         for k in range(len(centre)):
             sizes = [min(factor * centre[k], widest[k]) for factor in CLEARANCE_FACTORS]
             for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
                 other = centre.copy()
                 other[k] = size
-                legs.append(Leg(parameters, other))
-        self._begin([*legs, *_of_factors(parameters, centre)], depth, profile)
+                legs.append((parameters, other))
+        legs += [(one, centre) for one in _of_factors(parameters)]
+        self._begin_legs(legs, depth, profile)
 
     def begin_expected(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
     ) -> None:
         """Begin the expected leg alone, as of `begin`."""
-        self._begin([Leg(parameters, np.maximum(clearance_m, LEAST_CLEARANCE_M))], depth, profile)
+        self._begin_legs([(parameters, np.maximum(clearance_m, LEAST_CLEARANCE_M))], depth, profile)
+
+    def begin_identification(
+        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
+    ) -> None:
+        """Begin the leg with given parameters, then legs in which all of them are changed, as of `design`."""
+        expected = np.maximum(clearance_m, LEAST_CLEARANCE_M)
+        self._begin_legs([(one, expected) for one in _changed(near)], depth, profile)
 
     def go_on(self, part: TorqueReference, depth: Floats) -> None:
         """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
@@ -406,15 +382,24 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         depth : (k, 2, N) array
             Wear depths [m], as of `begin`.
         """
+        own = part.parameters
         if part.is_of_parameters:
-            legs = _changed(part.parameters, part.clearance_m[0])
+            parameters = _changed(own)
         else:
-            others = part.clearance_m[: 1 + part.of_joints.size]
-            legs = [Leg(part.parameters, clearance_m) for clearance_m in others]
-            legs += _of_factors(part.parameters, part.clearance_m[0]) if part.of_frictions.size else []
-        self._begin(legs, depth, part.profile)
-        self._done = part.torque_nm
-        self._periods = -(-self._cost(legs[: len(self._done)]) // SIM_CYCLES_PER_PERIOD)
+            parameters = [own] * (1 + part.of_joints.size)
+            parameters += _of_factors(own) if part.of_frictions.size else []
+        legs = list(zip(parameters, part.clearance_m, strict=True))
+        self._begin_legs(legs, depth, part.profile, part.torque_nm)
+
+    def _begin_legs(
+        self,
+        legs: Sequence[tuple[LegParameters, Floats]],
+        depth: Floats,
+        profile: CrankProfile,
+        done: Sequence[HalfFloats] = (),
+    ) -> None:
+        cycles = [2 * self._cycles, *([self._cycles] * (len(legs) - 1))]
+        self._begin([Leg(*leg, n) for leg, n in zip(legs, cycles, strict=True)], depth, profile, done)
 
     @property
     def part(self) -> TorqueReference | None:
@@ -422,30 +407,12 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         self._take(waits=not self.may_be_late)
         return self._so_far() if self._done and self.is_busy else None
 
-    def begin_identification(
-        self,
-        clearance_m: Floats,
-        depth: Floats,
-        profile: CrankProfile,
-        near: LegParameters,
-    ) -> None:
-        """Begin the leg with given parameters, then legs in which all of them are changed, as of `design`."""
-        self._begin(_changed(near, np.maximum(clearance_m, LEAST_CLEARANCE_M)), depth, profile)
-
     def _so_far(self) -> TorqueReference:
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
         return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 
-    def _kept(self, leg: SimulatedLeg) -> HalfFloats:
-        return leg.torque.astype(np.float16)
-
-    def _cycles_of(self, leg: Leg) -> int:
-        cycles = self._cycles or CYCLES
-        return 2 * cycles if leg is self._legs[0] else cycles  # the first is the expected one
-
-    @property
-    def _pace(self) -> int:
-        return SIM_CYCLES_PER_PERIOD
+    def _stored(self, torque: Floats, eccentricity: Floats) -> HalfFloats:
+        return torque.astype(np.float16)
 
 
 def design(parameters: int) -> Floats:
@@ -467,8 +434,8 @@ def levels_of(near: LegParameters) -> Floats:
     return design(2 * len(near.mass) + 1)
 
 
-def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """The leg with given parameters, then legs with other masses, lengths and friction."""
+def _changed(near: LegParameters) -> list[LegParameters]:
+    """Given parameters, then those of legs with other masses, lengths and friction."""
     bodies, legs = len(near.mass), []
     for levels in levels_of(near):
         mass, length, friction = np.split(levels, [bodies, 2 * bodies])
@@ -478,16 +445,15 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[Leg]:
             length=near.length + LONGER * length,
             friction=near.friction * ROUGHER ** friction.item(),
         )
-        legs.append(Leg(changed, clearance_m))
+        legs.append(changed)
     return legs
 
 
-def _of_factors(near: LegParameters, clearance_m: Floats) -> list[Leg]:
-    """Legs with a changed mass of each body in turn, then with a changed friction."""
+def _of_factors(near: LegParameters) -> list[LegParameters]:
+    """Parameters with a changed mass of each body in turn, then with a changed friction."""
     masses = [near.mass * factor**one for one in np.eye(len(near.mass)) for factor in MASSES]
     changed = [attrs.evolve(near, mass=mass) for mass in masses]
-    changed += [attrs.evolve(near, friction=near.friction * factor) for factor in FRICTIONS]
-    return [Leg(one, clearance_m) for one in changed]
+    return changed + [attrs.evolve(near, friction=near.friction * factor) for factor in FRICTIONS]
 
 
 # Effect of clearances on the angles of further joints: the linear model of `monitor.encoders`.
@@ -607,8 +573,6 @@ def angle_columns(model: AngleModel, shape: Floats) -> Floats:
 ANGLE_CYCLES = 48  # simulated cycles per leg: their scatter equals the scatter of as many observed cycles
 OPENED_M = 1.5e-4  # increase of each clearance in turn [m]
 
-_ANGLE_PACE = 1  # simulated gait cycles in an evaluation period
-
 
 @attrs.frozen(eq=False)
 class AngleReference:
@@ -647,6 +611,8 @@ class AngleReferenceRun(ReferenceRun[AngleReference]):
         Averaged gait cycles of each leg.
     """
 
+    pace = 1
+
     def __init__(self, mechanism: Mechanism, model: AngleModel, cycles: int = ANGLE_CYCLES) -> None:
         super().__init__(mechanism)
         self._model, self._cycles, self._speed = model, cycles, prepare(mechanism).speed
@@ -666,7 +632,8 @@ class AngleReferenceRun(ReferenceRun[AngleReference]):
         expected = np.maximum(clearance_m, LEAST_CLEARANCE_M)
         clearances = [expected, *(expected + OPENED_M * np.eye(len(expected)))]
         own = LegParameters.none(self._mechanism)
-        self._begin([Leg(own, one) for one in clearances], depth, profile or CrankProfile.steady(self._speed))
+        legs = [Leg(own, one, self._cycles) for one in clearances]
+        self._begin(legs, depth, profile or CrankProfile.steady(self._speed))
 
     def _so_far(self) -> AngleReference:
         expected, by_e = self._legs[0].clearance_m, self._model.by_e
@@ -677,15 +644,8 @@ class AngleReferenceRun(ReferenceRun[AngleReference]):
             columns[:, :, k] = (deviations[k + 1] - deviations[0]) / OPENED_M
         return AngleReference(expected, deviations[0], columns, self._cycles, self._profile)
 
-    def _kept(self, leg: SimulatedLeg) -> Floats:
-        return leg.eccentricity
-
-    def _cycles_of(self, leg: Leg) -> int:
-        return self._cycles
-
-    @property
-    def _pace(self) -> int:
-        return _ANGLE_PACE
+    def _stored(self, torque: Floats, eccentricity: Floats) -> Floats:
+        return eccentricity
 
 
 def at_phases(profile: CrankProfile, eccentricity: Floats) -> Floats:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import attrs
 import numpy as np
 from legs import LEG, NEW_M
 from model import JOINTS, NONE, SOME, KnownLeg, Network, cause_of, hypotheses
@@ -231,9 +232,9 @@ def today(legs: list[Stored], names: list[str], longest: int, counts: Counts) ->
                     break
             seconds, load_n = time.process_time() - began, seen.load.peak_n if seen.load else 0.0
             print(f"{name}: {cycle} cycles, {seconds:.0f} s, load {load_n:.0f} N, {seen.reason or 'sure'}")
-            then = one.snapshot()
+            then = attrs.evolve(one.state)
             for case in cases_of(stored, name):
-                one.restore(then)
+                one.go_on_from(then)
                 for seen in observed(one, LEG, stream(stored, case.state, after, 11, cycle), cycle):
                     if any(change.is_sure for change in seen.changes):
                         break

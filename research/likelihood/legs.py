@@ -163,7 +163,7 @@ def _simulated(leg: Drawn) -> list[np.ndarray]:
         one = simulation.simulate(leg.profile, changed, state.clearance_m, none, SETTLING, cycles)
         if one is None:
             raise LegWearError(f"state {i} cannot be simulated")
-        found.append(one.torque.astype(np.float16))
+        found.append(one[0].astype(np.float16))
     return found
 
 

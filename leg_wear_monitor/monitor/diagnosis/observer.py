@@ -46,7 +46,7 @@ from leg_wear_monitor.monitor.diagnosis.state import (
 )
 from leg_wear_monitor.state import FootLoad
 from leg_wear_monitor.twin.reference import LegParameters
-from leg_wear_monitor.twin.references import ReferenceSnapshot, TorqueReference
+from leg_wear_monitor.twin.references import TorqueReference
 from leg_wear_monitor.twin.sample import GROUND, MEASURED, KeepsSamples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -63,10 +63,6 @@ _ESTIMATED_M, _ESTIMATED = (
 
 def _joined(*reasons: str) -> str:
     return "; ".join(filter(None, reasons))
-
-
-TorqueObserverSnapshot = tuple[TorqueState, ReferenceSnapshot | None]
-"""Whole state of a `TorqueObserver`."""
 
 
 class TorqueObserver(KeepsSamples):
@@ -206,11 +202,11 @@ class TorqueObserver(KeepsSamples):
 
     def _start_again(self, before: TorqueState, modelled_m: Floats, failure: str) -> None:
         """Start again, because the torques so far lead to no estimate."""
-        self._references.leave()
-        self._references.restore(None)
         settled, not_used = before.corrections, before.not_used
-        self.state = TorqueState(
-            np.asarray(modelled_m, float).copy(), settled=settled, not_used=not_used, failure=failure
+        self.go_on_from(
+            TorqueState(
+                np.asarray(modelled_m, float).copy(), settled=settled, not_used=not_used, failure=failure
+            )
         )
 
     def _end_period(self, modelled_m: Floats, depth: Floats) -> Change | None:
@@ -353,15 +349,10 @@ class TorqueObserver(KeepsSamples):
                     clearance_m[k], sigma_m[k] = one.value, one.sigma
         return clearance_m, sigma_m
 
-    def snapshot(self) -> TorqueObserverSnapshot:
-        """A copy of the whole state."""
-        return attrs.evolve(self.state), self._references.snapshot()
-
-    def restore(self, snapshot: TorqueObserverSnapshot) -> None:
-        """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
-        state, reference = snapshot
+    def go_on_from(self, state: TorqueState) -> None:
+        """Go on from a state of the same leg, without the simulation that goes on."""
+        self._references.stop()
         self.state = attrs.evolve(state)
-        self._references.restore(reference)
 
     def _evaluate(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the evidence."""

@@ -31,7 +31,6 @@ from leg_wear_monitor.twin.reference import CrankProfile, LegParameters, mean_pr
 from leg_wear_monitor.twin.references import (
     CADENCES,
     LEAST_CLEARANCE_M,
-    ReferenceSnapshot,
     TorqueReference,
     TorqueReferenceRun,
     levels_of,
@@ -277,15 +276,10 @@ class References:
         """The unfinished reference with the legs simulated so far; None if there are none, or all are."""
         return self._run.part if self._run is not None else None
 
-    def snapshot(self) -> ReferenceSnapshot | None:
-        """State of the simulation; None before the first one."""
-        return self._run.snapshot() if self._run else None
-
-    def restore(self, snapshot: ReferenceSnapshot | None) -> None:
-        """Restore a snapshot of the same mechanism; later results are equal bit for bit."""
+    def stop(self) -> None:
+        """Forget the simulation that goes on."""
+        self.leave()
         self._run = None
-        if snapshot is not None:
-            self._running().restore(snapshot)
 
     def leave(self) -> None:
         """Stop simulating ahead, see `ReferenceRun.leave`."""

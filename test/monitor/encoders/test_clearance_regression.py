@@ -22,9 +22,9 @@ from leg_wear_monitor.twin.references import (
     PHASES,
     AngleReference,
     AngleReferenceRun,
+    angle_columns,
     angle_model,
     at_phases,
-    design,
 )
 
 SENSORS = ("B", "G", "I")  # hip, knee, ankle
@@ -49,7 +49,7 @@ def shape():
 @pytest.fixture(scope="module")
 def reference(model, shape):
     """Of a leg that obeys the linear model, so well known as if from any number of gait cycles."""
-    columns = design(model, shape)
+    columns = angle_columns(model, shape)
     return AngleReference(FRESH, columns[:, :, :5] @ FRESH, columns, 10**9, CrankProfile.steady(TURN))
 
 
@@ -66,7 +66,7 @@ def read(model, shape, clearance, errors=ERRORS, noise=0.0, seed=0, scatter=0.05
     random = np.random.default_rng(seed)
     crank = (np.arange(PHASES) + 0.5) * (TURN / PHASES)
     seen = np.asarray(clearance) * (1.0 + scatter * random.standard_normal(len(clearance)))
-    deviation = design(model, shape) @ np.concatenate([seen, errors])
+    deviation = angle_columns(model, shape) @ np.concatenate([seen, errors])
     ideal = model.angle[len(model.angle) // PHASES // 2 :: len(model.angle) // PHASES]
     return crank, ideal + deviation + noise * random.standard_normal(ideal.shape)
 

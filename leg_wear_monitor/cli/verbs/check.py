@@ -230,9 +230,9 @@ def drives(name: str | None, json_file: Path | None) -> None:
 
     NAME is a drive of the list, or a file such as ./my_drive.yaml.
     """
-    from leg_wear_monitor.mechanism import sourced
+    from leg_wear_monitor.mechanism import materials as loader
 
-    known = [sourced.load_drive(each) for each in ([name] if name is not None else sourced.drives())]
+    known = [loader.load_drive(each) for each in ([name] if name is not None else loader.drives())]
     _report("drives", known, _drive_listed if name is None else _drive_in_full, json_file)
 
 

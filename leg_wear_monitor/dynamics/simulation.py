@@ -580,7 +580,7 @@ class Leg:
         """Set a stepper of this leg to the leg's initial state."""
         stepper.init(self.crank_angle_rad, stepper.speed)
         chance = np.random.default_rng(self.seed)
-        joints = len(stepper.eccentricity)
+        joints = len(stepper.state.approach)
         away = self.perturb_m * np.sqrt(chance.random(joints))
         direction = TURN * chance.random(joints)
         stepper.set_eccentricities(np.stack([away * np.cos(direction), away * np.sin(direction)], axis=1))

@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -27,17 +26,8 @@ from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, 
 PERSON_TOLERANCE = 0.2  # tolerance of a person's mass as a fraction, for food, clothes and loads
 
 
-class _Segment(NamedTuple):
-    mass: float
-    centre: float
-    gyration: float
-
-
-SEGMENTS = {
-    "thigh": _Segment(0.100, 0.433, 0.323),
-    "shank": _Segment(0.0465, 0.433, 0.302),
-    "foot": _Segment(0.0145, 0.500, 0.475),
-}
+# mass, distance of the centre of mass, radius of gyration
+SEGMENTS = {"thigh": (0.100, 0.433, 0.323), "shank": (0.0465, 0.433, 0.302), "foot": (0.0145, 0.500, 0.475)}
 
 
 def with_person(mechanism: Mechanism, person_kg: float) -> Mechanism:
@@ -97,13 +87,16 @@ def _joint(mechanism: Mechanism, body: str, other: str) -> str | None:
     return next((name for name in mechanism.joints if {*mechanism.sides(name)} == {body, other}), None)
 
 
-def _with(body: Body, segment: _Segment, person_kg: float, upper: Vector, lower: Vector) -> Body:
+def _with(
+    body: Body, segment: tuple[float, float, float], person_kg: float, upper: Vector, lower: Vector
+) -> Body:
     """A body with a segment between two of its points."""
-    mass, length = segment.mass * person_kg, math.dist(upper, lower)
-    centre = [a + segment.centre * (b - a) for a, b in zip(upper, lower, strict=True)]
+    fraction, away, gyration = segment
+    mass, length = fraction * person_kg, math.dist(upper, lower)
+    centre = [a + away * (b - a) for a, b in zip(upper, lower, strict=True)]
     whole = body.mass + mass
     x, y = ((body.mass * a + mass * b) / whole for a, b in zip(body.com, centre, strict=True))
-    inertia = body.inertia + mass * (segment.gyration * length) ** 2
+    inertia = body.inertia + mass * (gyration * length) ** 2
     inertia += body.mass * mass / whole * math.dist(body.com, centre) ** 2
     return attrs.evolve(body, mass=whole, inertia=inertia, com=(x, y))
 

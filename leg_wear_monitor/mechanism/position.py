@@ -2,8 +2,7 @@
 
 import functools
 import math
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import attrs
@@ -45,14 +44,6 @@ class Linkage(NamedTuple):
     mechanism: Mechanism
     arrays: MechanismArrays
     rows: Rows
-
-
-class OpenJoint(NamedTuple):
-    """A joint that does not close: its name, its gap [m], coordinates (n, 3) with all other joints closed."""
-
-    joint: str
-    gap_m: float
-    q: Floats
 
 
 class Closures(NamedTuple):
@@ -222,11 +213,14 @@ def nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> Fl
     return q
 
 
-def open_joint(linkage: Linkage) -> OpenJoint:
-    """The joint with the smallest gap when all other joints are closed, at the file's crank angle."""
+def open_joint(linkage: Linkage) -> tuple[str, float, Floats]:
+    """The joint with the smallest gap [m] when all other joints are closed, at the file's crank angle.
+
+    The coordinates (n, 3) with all other joints closed come last.
+    """
     start, angle = com_poses(linkage.mechanism), linkage.mechanism.assembly.crank_angle
     rows, names = linkage.rows, list(linkage.mechanism.joints)
-    found: list[tuple[bool, OpenJoint]] = []
+    found: list[tuple[bool, float, str, Floats]] = []
     for closure, row in zip(rows.closure, rows.row, strict=True):
         if closure == DRIVE:
             continue
@@ -234,8 +228,9 @@ def open_joint(linkage: Linkage) -> OpenJoint:
         phi = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).phi
         gap = float(np.hypot(*phi[row : row + 2]))
         others_open = np.abs(np.delete(phi, [row, row + 1])).max() > 0.01 * gap
-        found.append((bool(others_open), OpenJoint(names[closure], gap, q)))
-    return min(found, key=lambda one: (one[0], one[1].gap_m))[1]
+        found.append((bool(others_open), gap, names[closure], q))
+    _, gap, joint, q = min(found, key=lambda one: one[:2])
+    return joint, gap, q
 
 
 def all_but(linkage: Linkage, joint: str) -> Floats:
@@ -293,15 +288,9 @@ def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
 
 
 def furthest(linkage: Linkage, q: Floats, angle: float, target: float) -> tuple[float, Floats]:
-    """Last crank angle [rad] and coordinates (n, 3) of `walk`: the target's, or those before a dead point."""
-    last = deque(walk(linkage, q, angle, target), maxlen=1)
-    return last[0] if last else (angle, q)
+    """Last crank angle [rad] on the way from q at ``angle`` to ``target``, and coordinates (n, 3) there.
 
-
-def walk(linkage: Linkage, q: Floats, angle: float, target: float) -> Iterator[tuple[float, Floats]]:
-    """Crank angles [rad] and coordinates (n, 3) from q at ``angle`` to ``target``, continued on one branch.
-
-    Before a dead point, they end early.
+    They are continued on one branch: the target's, or those before a dead point.
     """
     longest = _LONGEST_STEP  # shorter after a failed step: near a dead point, the next would fail as well
     while angle != target:
@@ -309,11 +298,11 @@ def walk(linkage: Linkage, q: Floats, angle: float, target: float) -> Iterator[t
         while (near := _step(linkage, q, angle, step)) is None:
             step *= 0.5
             if abs(step) < _SHORTEST_STEP:
-                return
+                return angle, q
             longest = abs(step)
         longest = min(2.0 * longest, _LONGEST_STEP)
         q, angle = near, target if step == target - angle else angle + step
-        yield angle, q
+    return angle, q
 
 
 def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | None:

@@ -7,8 +7,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Snapshot
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.model import state_shapes
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables, views
 from leg_wear_monitor.dynamics.joint import EX, EY, F_N, F_T, VX, VY
 from leg_wear_monitor.dynamics.result import JointResult
 from leg_wear_monitor.dynamics.run import (
@@ -456,14 +457,16 @@ def _growth(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     """Logarithmic growth factors (steps,) of one run."""
     stepper, statistics = leg.stepper, new_run_statistics(len(leg.setup.linkage.mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
-    steps, depth = SAMPLES // settings["renewals"], stepper.snapshot().depth
+    steps, depth = SAMPLES // settings["renewals"], stepper.state.depth.copy()
 
     def advance(motion: Floats) -> Floats:
-        stepper.restore(Snapshot(motion, depth))
+        stepper.state.motion[:], stepper.state.depth[:] = motion, depth
         leg.advance(steps, statistics)
-        return stepper.snapshot().motion
+        return stepper.state.motion.copy()
 
-    scale, approach = _scale(leg), stepper.snapshot_mask("approach")
+    scale, rates = _scale(leg), np.zeros(len(stepper.state.motion))
+    _of_joints(leg, rates)["approach"][:] = 1.0
+    approach = rates > 0.0
 
     def same_contacts(one: Floats, other: Floats) -> bool:
         return bool(np.array_equal(one[approach] > 0.0, other[approach] > 0.0))
@@ -471,7 +474,7 @@ def _growth(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     direction = np.random.default_rng([settings["seed"], 2]).normal(size=len(scale))
     direction[approach] = 0.0
     return stretches(
-        advance, stepper.snapshot().motion, direction, scale,
+        advance, stepper.state.motion.copy(), direction, scale,
         settings["distance"], settings["cycles"] * settings["renewals"], same_contacts,
     )  # fmt: skip
 
@@ -480,11 +483,15 @@ def _scale(leg: ObservedLeg) -> Floats:
     """Scale of each number of the state: the clearance, and clearance times crank speed for rates."""
     clearance = float(leg.setup.contacts.clearance.min())
     rate = clearance * abs(leg.setup.speed)
-    units = {"e": clearance, "v": rate, "approach": rate}
-    scale = np.zeros(len(leg.stepper.snapshot().motion))
-    for name, unit in units.items():
-        scale[leg.stepper.snapshot_mask(name)] = unit
+    scale = np.zeros(len(leg.stepper.state.motion))
+    for name, unit in {"e": clearance, "v": rate, "approach": rate}.items():
+        _of_joints(leg, scale)[name][:] = unit
     return scale
+
+
+def _of_joints(leg: ObservedLeg, motion: Floats) -> dict[str, Floats]:
+    """Views of the parts of an array with an entry for each number of a leg's state, by name."""
+    return views(motion, state_shapes(len(leg.stepper.state.approach)))
 
 
 # Poincaré sections at one crank angle, and phase portraits over a few cycles.

@@ -14,7 +14,7 @@ from leg_wear_monitor.dynamics.clearance.model import ClearanceModel, Coupling, 
 from leg_wear_monitor.dynamics.clearance.stepper import (
     INTERVALS,
     ClearanceStepper,
-    LoadedTables,
+    LoadedTable,
     loaded_tables,
     put_force,
     under_trial_force,
@@ -332,7 +332,7 @@ class LegSimulation:
         self._mechanism = mechanism
         self._parameters: LegParameters | None = None
         self._tables: ClearanceTables | None = None
-        self._loaded: LoadedTables | None = None
+        self._loaded: list[LoadedTable] | None = None
 
     def simulate(
         self,

@@ -134,9 +134,8 @@ class TorqueProfile:
 
     Attributes
     ----------
-    number, angle_rad : (FINE_PHASES,) array
-        Samples in each phase, averages weighted by the time that they stand for, and the sum of their crank
-        angles.
+    number : (FINE_PHASES,) array
+        Samples in each phase, averages weighted by the time that they stand for.
     measured_nm, predicted_nm : (FINE_PHASES,) array
         Measured torque, and the torque of the model without a foot load.
     lever_m : (FINE_PHASES,) array
@@ -144,7 +143,6 @@ class TorqueProfile:
     """
 
     number: Floats
-    angle_rad: Floats
     measured_nm: Floats
     predicted_nm: Floats
     lever_m: Floats

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import Leg, advance_batch, prepare, prepare_legs
 from leg_wear_monitor.mechanism.position import TURN
@@ -21,19 +20,6 @@ def with_joint(leg, name, **changes):
     return attrs.evolve(
         leg, clearances={**leg.clearances, name: attrs.evolve(leg.clearances[name], **changes)}
     )
-
-
-@pytest.mark.parametrize("name, joints", [("bionic_leg", ("A", "G")), ("jansen_leg", None)])
-def test_tables_of_a_shared_basis_are_those_of_the_leg_alone(name, joints):
-    """Bit for bit: the radii change the friction's levers, which are not in the basis of other legs."""
-    first, other = (
-        prepare(load_mechanism(name), clearances=joints, clearance_m=clearance) for clearance in (None, 1e-4)
-    )
-    basis = build_basis(first.linkage, first.contacts)
-    shared = build_tables(other.linkage, other.contacts, basis=basis)
-    alone, former = (build_tables(setup.linkage, setup.contacts) for setup in (other, first))
-    assert all(map(np.array_equal, shared, alone))
-    assert not all(map(np.array_equal, shared, former))
 
 
 @pytest.fixture(scope="module")

@@ -137,12 +137,12 @@ def test_restored_it_goes_on_bit_for_bit(new_stepper, in_one_go, at, astray):
     before = [Piece(polynomial, min(end, at)) for polynomial, end in START_STOP_REVERSE if end - 0.05 < at]
     after = [piece for piece in START_STOP_REVERSE if piece.end >= at]
     drive(stepper, before, statistics)
-    snapshot = stepper.snapshot()
+    motion, depth = stepper.state.motion.copy(), stepper.state.depth.copy()
     away = steady_drive(stepper.state.drive[0], astray, stepper.time)
     drive(stepper, [Piece(away, stepper.time + 0.02)], new_run_statistics(10))
     another = new_stepper()
     for restored in (stepper, another):
-        restored.restore(snapshot)
+        restored.state.motion[:], restored.state.depth[:] = motion, depth
         drive(restored, after, new_run_statistics(10))
         assert_same(restored, in_one_go[0])
 
@@ -202,9 +202,9 @@ def test_a_senseless_drive_is_refused_and_forgotten(new_stepper, in_one_go, i, v
 @pytest.mark.parametrize("t_end", [np.nan, -1.0, -np.inf])
 def test_an_end_that_is_not_ahead_changes_nothing(new_stepper, t_end):
     stepper, statistics = new_stepper(), new_run_statistics(10)
-    before = stepper.snapshot()
+    before = stepper.state.motion.copy()
     assert stepper.advance(steady_drive(0.0, TURN), t_end, statistics) == (DONE, -1)
-    np.testing.assert_array_equal(stepper.state.motion, before.motion)
+    np.testing.assert_array_equal(stepper.state.motion, before)
     assert not statistics.time[0]
 
 

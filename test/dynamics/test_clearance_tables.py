@@ -7,6 +7,7 @@ import pytest
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.tables import (
     COARSER,
+    POINTS,
     ClearanceTables,
     build_tables,
     changing_shapes,
@@ -19,7 +20,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 
-POINTS = 256  # of a turn: enough for smooth tables
 LEGS = ("bionic_leg", "jansen_leg", "four_bar")
 
 
@@ -67,7 +67,7 @@ def cases(document):
     result = {}
     for name, mechanism, clearance_joints in zip(LEGS, mechanisms, ("ABGIJ", "ABGIJ", "B"), strict=True):
         setup = prepare(mechanism, clearances=tuple(clearance_joints))
-        tables = build_tables(setup.linkage, setup.contacts, POINTS)
+        tables = build_tables(setup.linkage, setup.contacts)
         result[name] = Case(setup.linkage, setup.contacts, tables, name == "four_bar")
     return result
 
@@ -204,9 +204,7 @@ def test_the_power_of_loads_holds_to_the_first_order_in_the_eccentricities(leg, 
     """By any rates of crank and journals: a quarter of the error at half of the eccentricities."""
     ground = ConstantLoad(body="foot", point="toe", force=(40.0, 290.0))
     setup = prepare(attrs.evolve(leg, loads={"ground": ground}))
-    case = Case(
-        setup.linkage, setup.contacts, build_tables(setup.linkage, setup.contacts, POINTS), damped=False
-    )
+    case = Case(setup.linkage, setup.contacts, build_tables(setup.linkage, setup.contacts), damped=False)
     random = np.random.default_rng(i)
     direction, rates = random.normal(size=(2, 2 * len(setup.clearance_joints)))
     errors, changes = [], []

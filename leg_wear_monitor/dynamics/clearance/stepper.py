@@ -28,7 +28,6 @@ from leg_wear_monitor.dynamics.clearance.model import (
     clearance_state,
     clearance_work,
     rigid_coupling,
-    state_shapes,
 )
 from leg_wear_monitor.dynamics.clearance.tables import (
     COARSER,
@@ -65,13 +64,6 @@ STATISTICS_INTERVALS = 1024
 _MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
-
-
-class Snapshot(NamedTuple):
-    """Complete state of a stepper; a restored stepper gives bit-identical results."""
-
-    motion: Floats
-    depth: Floats
 
 
 class ClearanceStepper:
@@ -144,11 +136,6 @@ class ClearanceStepper:
         return float(self.state.drive[SPEED])
 
     @property
-    def eccentricity(self) -> Floats:
-        """Journals' centres (k, 2) in their bushings [m]; a copy."""
-        return self.state.e.reshape(-1, 2).copy()
-
-    @property
     def last_force(self) -> Floats:
         """Magnitude (k,) of the contact forces [N] at the last sample before that time."""
         sample = self._sample()
@@ -161,12 +148,6 @@ class ClearanceStepper:
     def set_eccentricities(self, eccentricity: Floats) -> None:
         """Set the eccentricities (k, 2) [m]."""
         self.state.e[:] = eccentricity.ravel()
-
-    def snapshot_mask(self, name: str) -> Flags:
-        """Mask (s,) of the entries of a snapshot's ``motion`` that belong to a field of `ClearanceState`."""
-        shapes = state_shapes(len(self.state.approach))
-        names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
-        return np.asarray(names == name)
 
     def observe(self) -> Sample:
         """The leg at that time; does not change the state."""
@@ -217,15 +198,6 @@ class ClearanceStepper:
         """Address of `ADVANCE` for calls with this stepper from compiled code; compiles it if need be."""
         feeds_back = self._setup.surfaces.feeds_back
         return ADVANCE.address(self.model, feeds_back, self.state, polynomial, 0.0, statistics, self.work)
-
-    def snapshot(self) -> Snapshot:
-        """A copy of the whole state."""
-        return Snapshot(self.state.motion.copy(), self.state.depth.copy())
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot of a stepper of the same setup."""
-        self.state.motion[:] = snapshot.motion
-        self.state.depth[:] = snapshot.depth
 
     def take_tables(self) -> None:
         """Cut intervals into parts as the tables say, which were changed in place."""
@@ -414,15 +386,6 @@ class LoadedTable(NamedTuple):
     parts: Floats
 
 
-class LoadedTables(NamedTuple):
-    """The tables of `ClearanceTables` in `UNDER_LOAD`."""
-
-    motion: LoadedTable
-    reaction: LoadedTable
-    stored: LoadedTable
-    by_e: LoadedTable
-
-
 def under_trial_force(linkage: Linkage) -> list[Linkage]:
     """A linkage under a force on its toe along each axis, for `build_basis`; none for one without a toe."""
     mechanism = linkage.mechanism
@@ -438,8 +401,8 @@ def under_trial_force(linkage: Linkage) -> list[Linkage]:
 
 def loaded_tables(
     linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, basis: Basis | None = None
-) -> LoadedTables:
-    """The tables that a force on the toe changes.
+) -> list[LoadedTable]:
+    """The tables of `UNDER_LOAD`, which a force on the toe changes.
 
     Parameters
     ----------
@@ -453,15 +416,15 @@ def loaded_tables(
     """
     basis = basis or build_basis(linkage, contacts, loaded=under_trial_force(linkage))
     found = []
-    for name in LoadedTables._fields:
-        table, make = getattr(tables, name), UNDER_LOAD[name]
+    for name, make in UNDER_LOAD.items():
+        table = getattr(tables, name)
         rows = table.reshape(len(table), -1)  # a view
         slopes = [_slope(make(linkage, contacts, each), rows) for each in basis.loaded]
         found.append(_loaded(rows, slopes))
-    return LoadedTables(*found)
+    return found
 
 
-def put_force(loaded: LoadedTables, force: Floats) -> None:
+def put_force(loaded: Sequence[LoadedTable], force: Floats) -> None:
     """Set the tables to a force (N, 2) [N] along the axes of the mechanism, at their points of a turn."""
     fine = np.concatenate([force, force[:1]])
     for table, step in zip(loaded, (1, 1, 1, COARSER), strict=True):

@@ -117,26 +117,17 @@ class Basis:
         self.drive = self.x[:, :, linkage.rows.drive_row]
         self.drive_t = motion.a[:, 1:].reshape(n, -1)
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
-        self._take_levers(linkage, contacts)
+        levers = _friction_levers(linkage.arrays, contacts)
+        self.friction: Floats = np.broadcast_to(levers, (n, *levers.shape))
         self.drag = _drag(linkage.arrays, motion.q, self.all)
         curvature = self._curve(linkage, motion.q)  # larger than all else, and not kept
         self._take_forces(linkage, curvature)
         self.loaded = tuple(self._under_load(one, curvature) for one in loaded)
 
-    def with_contacts(self, linkage: Linkage, contacts: ContactArrays) -> "Basis":
-        """Basis of the same linkage and joints with other radii: only the levers of friction differ."""
-        other = copy.copy(self)
-        other._take_levers(linkage, contacts)
-        return other
-
     def _under_load(self, linkage: Linkage, curvature: Floats) -> "Basis":
         other = copy.copy(self)
         other._take_forces(linkage, curvature)
         return other
-
-    def _take_levers(self, linkage: Linkage, contacts: ContactArrays) -> None:
-        levers = _friction_levers(linkage.arrays, contacts)
-        self.friction: Floats = np.broadcast_to(levers, (len(self.motion.q), *levers.shape))
 
     def _nudged(self, q: Floats, j: int) -> tuple[Floats, Floats]:
         """Coordinates ahead of q (N, n, 3) along column j of S, and behind."""
@@ -369,17 +360,13 @@ class ClearanceTables(NamedTuple):
     bend: Singles
 
 
-def build_basis(
-    linkage: Linkage, contacts: ContactArrays, points: int = POINTS, loaded: Sequence[Linkage] = ()
-) -> Basis:
-    """Data for the tables of a linkage, except the radii of its clearance joints: they take most of the time.
+def build_basis(linkage: Linkage, contacts: ContactArrays, loaded: Sequence[Linkage] = ()) -> Basis:
+    """Data for the tables of a linkage; they take most of the time.
 
     Parameters
     ----------
     linkage : Linkage
     contacts : ContactArrays
-    points : int
-        Crank steps per turn.
     loaded : sequence of Linkage
         The same linkage under other loads; their bases are made as well.
 
@@ -388,25 +375,18 @@ def build_basis(
     AssemblyError
         If the linkage does not close or has a dead point.
     """
-    return Basis(linkage, contacts, one_cycle(linkage, points, 1.0), loaded)
+    return Basis(linkage, contacts, one_cycle(linkage, POINTS, 1.0), loaded)
 
 
-def build_tables(
-    linkage: Linkage,
-    contacts: ContactArrays,
-    points: int = POINTS,
-    basis: Basis | None = None,
-) -> ClearanceTables:
+def build_tables(linkage: Linkage, contacts: ContactArrays, basis: Basis | None = None) -> ClearanceTables:
     """Tables of a linkage with the clearance joints of ``contacts``.
 
     Parameters
     ----------
     linkage : Linkage
     contacts : ContactArrays
-    points : int
-        Crank steps per turn.
     basis : Basis, optional
-        Basis of the same linkage and clearance joints, with any radii; ``points`` is then not used.
+        Basis of this linkage and these joints, if there is one already.
 
     Returns
     -------
@@ -417,7 +397,7 @@ def build_tables(
     AssemblyError
         If the linkage does not close or has a dead point.
     """
-    basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
+    basis = basis or build_basis(linkage, contacts)
     return ClearanceTables(
         motion=_motion(linkage, contacts, basis),
         reaction=_reaction(linkage, contacts, basis),

@@ -45,7 +45,7 @@ def walk_of(seed: int) -> dict[str, Any]:
         "speeds_rpm": speeds,
         "ripple": float(rng.uniform(0.0, 0.05)),
         "friction_nm": float(rng.uniform(0.0, 1.5)),
-        "toe_force_n": 100.0 if rng.random() < 0.2 else 0.0,
+        "ground_n": 100.0 if rng.random() < 0.2 else 0.0,
         "clearances_m": tuple((CLEARANCE_M * rng.uniform(0.7, 1.3, JOINTS)).tolist()),
         "rate_hz": int(rng.choice([100, 200, 200, 500])),
     }
@@ -60,7 +60,7 @@ def walked(seed: int, cache: Path | None) -> Floats:
     speeds = walk["speeds_rpm"]
     times = tuple(WALK_S / len(speeds) * i for i in range(len(speeds)))
     pace = PaceConfig(times_s=times, speeds_rpm=speeds, ripple=walk["ripple"])
-    load = LoadConfig(toe_force_n=walk["toe_force_n"])
+    load = LoadConfig(ground_n=walk["ground_n"])
     leg = SyntheticLeg(GaitConfig(pace=pace, load=load, clearances_m=walk["clearances_m"]))
     for i in range(1, round(WALK_S / STEP_S)):
         now = leg.advance(STEP_S * i)
@@ -219,7 +219,7 @@ def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: 
         f"{seed}",
         " and ".join(f"{speed:.0f}" for speed in truth["speeds_rpm"]),
         f"{truth['rate_hz']}, {truth['sampling']}",
-        f"{truth['toe_force_n']:.0f}",
+        f"{truth['ground_n']:.0f}",
         f"{truth['sign']}, {truth['torque_sign']} / {value('crank.sign')}, {value('drive_torque.sign')}",
         f"{truth['gear_ratio']:g} / {value('crank.gear_ratio'):.6g}",
         f"{truth['source']} / {value('drive_torque.source')}",

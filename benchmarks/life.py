@@ -14,7 +14,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.life.life import JumpControl, LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting
@@ -58,10 +58,10 @@ def against_every_cycle(leg: Mechanism, cycles: int) -> None:
     )
     print("                              wear off, % | profile off, RMS % of deepest | worst sector, deg")
     for length in LENGTHS:
-        jump = JumpControl(max_wear_per_jump_m=length)
         began = time.process_time()
         lives = [
-            lived(leg, LifeSettings(jump=jump, seed=seed), HASTE, FAR_M, float(cycles)) for seed in SEEDS
+            lived(leg, LifeSettings(max_wear_per_jump_m=length, seed=seed), HASTE, FAR_M, float(cycles))
+            for seed in SEEDS
         ]
         took = (time.process_time() - began) / len(SEEDS)
         depth = np.array([life.depth[-1] for life in lives])

@@ -148,7 +148,6 @@ class TransportConfig:
 class LoadConfig:
     """Loads and friction without a message: the monitor has to estimate them from the torque."""
 
-    toe_force_n: float = _not_negative("N", "upward force of the ground on the toe while it moves backwards")
     friction_nm: float = _not_negative("N m", "friction of the drive, against its motion")
     person_kg: float = _not_negative(
         "kg", "mass of a person with one leg strapped to thigh, shank and foot", at_most=300.0

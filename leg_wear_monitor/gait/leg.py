@@ -31,7 +31,7 @@ from leg_wear_monitor.mechanism.person import (
     with_person,
     with_toe_force,
 )
-from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import TURN, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
 
 # The ground under the synthetic leg: a force on its toe that differs from step to step.
@@ -184,7 +184,6 @@ class Pace:
 
 
 _LONGEST_PIECE_S = 2.0e-3  # longest drive polynomial: follows a ripple of 50 Hz to 1e-9 rad
-_PUSH, _PUSH_PHASES = "toe_force_n", 72  # name of a load, and entries of its table
 _FRICTION_RAMP_RADPS = 0.05
 
 
@@ -226,12 +225,10 @@ class SyntheticLeg:
         self._pace = Pace(config.pace)
         speed = self._pace.at(0.0).speed
         self._ground = Ground(mechanism, config) if config.load.ground_n else None
-        leg = _pushed(mechanism, config.load.toe_force_n)
-        if self._ground:
-            leg = with_toe_force(leg, self._ground.step(speed))
+        leg = with_toe_force(mechanism, self._ground.step(speed)) if self._ground else mechanism
         setup = _setup(leg, config, speed)
         self.clearance_joints = setup.clearance_joints
-        self._foot_loads = [i for i, name in enumerate(leg.loads) if name in (GROUND_LOAD, _PUSH)]
+        self._foot_loads = [i for i, name in enumerate(leg.loads) if name == GROUND_LOAD]
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
         self._sides = _sides(mechanism, config.joint_encoders.joints)
@@ -330,19 +327,6 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     return attrs.evolve(
         setup, contacts=contacts._replace(clearance=clearance, wear_coefficient=wear), speed=speed
     )
-
-
-def _pushed(mechanism: Mechanism, force_n: float) -> Mechanism:
-    """Mechanism with a ground force on its toe, proportional to the toe's depth below its mean height."""
-    if force_n == 0.0:
-        return mechanism
-    if mechanism.toe is None:
-        raise ConfigError("gait", "load.toe_force_n", f"{mechanism.source} has no point called toe to push")
-    linkage = build_linkage(mechanism)
-    position, _, _ = point_motion(one_cycle(linkage, _PUSH_PHASES, TURN), linkage, *mechanism.toe)
-    depth = np.maximum(0.0, position[:, 1].mean() - position[:, 1])
-    push = force_n * depth / depth.max()
-    return with_toe_force(mechanism, np.stack([np.zeros_like(push), push], axis=1), _PUSH)
 
 
 def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:

@@ -20,7 +20,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_wear_monitor.configuration import described, quantity
+from leg_wear_monitor.configuration import quantity
 from leg_wear_monitor.dynamics.clearance.stepper import STATISTICS_INTERVALS, ClearanceStepper, length_of
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run import (
@@ -51,26 +51,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 # step-size control as for ODE solvers: largest growth and shrinkage of a jump, safety factor
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
 _TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest change
-
-
-@attrs.frozen(kw_only=True)
-class JumpControl:
-    """Limits on the length and the error of a jump."""
-
-    max_wear_per_jump_m: float = quantity(
-        "m", "deepest change of a surface that a jump may make", above=0.0, default=3.0e-5
-    )
-    tolerance_m: float = quantity(
-        "m", "error of the deepest change that a jump may make", above=0.0, default=3.0e-6
-    )
-    smooth_deg: float = quantity(
-        "deg", "standard deviation of the window that rates are smoothed by", at_least=0.0, default=5.0
-    )
-
-    @classmethod
-    def of(cls, max_wear_per_jump_m: float) -> "JumpControl":
-        """Limits of a jump from its deepest change [m]; the error tolerance is 10 % of this change."""
-        return cls(max_wear_per_jump_m=max_wear_per_jump_m, tolerance_m=_TOLERATED * max_wear_per_jump_m)
+_SMOOTH_DEG = 5.0  # standard deviation of the window that rates are smoothed by
 
 
 @attrs.frozen(eq=False)
@@ -141,10 +122,10 @@ def _ratio(before: Floats, after: Floats) -> Floats:
     return np.asarray(before.sum(axis=-1, keepdims=True) / np.where(sums > 0.0, sums, 1.0))
 
 
-def longest_jump(rate: WearRate, control: JumpControl) -> float:
-    """Largest number of gait cycles of a jump by the change of the surfaces; infinite without wear."""
+def longest_jump(rate: WearRate, max_wear_m: float) -> float:
+    """Largest number of gait cycles of a jump by the change of the surfaces [m]; infinite without wear."""
     deepest = float(rate.depth.sum(axis=1).max(initial=0.0))
-    return control.max_wear_per_jump_m / deepest if deepest > 0.0 else math.inf
+    return max_wear_m / deepest if deepest > 0.0 else math.inf
 
 
 def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:
@@ -157,11 +138,11 @@ def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:
     return np.asarray(0.5 * cycles * np.sqrt(np.maximum(differ - scatter, 0.0)))
 
 
-def next_jump(cycles: float, error_m: float, control: JumpControl) -> float:
-    """Gait cycles of the next jump, or of the repeated one if its error [m] is above the tolerance."""
+def next_jump(cycles: float, error_m: float, tolerance_m: float) -> float:
+    """Gait cycles of the next jump, or of the repeated one if its error [m] is above the tolerance [m]."""
     if error_m == 0.0:
         return _GROWS * cycles
-    factor = _SAFETY * math.sqrt(control.tolerance_m / error_m)
+    factor = _SAFETY * math.sqrt(tolerance_m / error_m)
     return cycles * min(_GROWS, max(_SHRINKS, factor))
 
 
@@ -240,7 +221,11 @@ MOST_JUMPS = 10_000  # per life; with the default length of a jump, a life takes
 
 
 def check_life(
-    clearance_joints: Sequence[str], fresh_m: Floats, radius_m: Floats, limit_m: ArrayLike, jump: JumpControl
+    clearance_joints: Sequence[str],
+    fresh_m: Floats,
+    radius_m: Floats,
+    limit_m: ArrayLike,
+    max_wear_per_jump_m: float,
 ) -> None:
     """Check that a life can end.
 
@@ -250,7 +235,8 @@ def check_life(
     fresh_m, radius_m : (k,) arrays
         Clearances when new, and radii of the bushings.
     limit_m : float or (k,) array
-    jump : JumpControl
+    max_wear_per_jump_m : float
+        As in `LifeSettings`.
 
     Raises
     ------
@@ -262,16 +248,18 @@ def check_life(
         fault = limit_fault(joint, float(fresh), float(radius), float(limit))
         if fault:
             raise ConfigError("limit-m", "", fault)
-    jumps = float((limits - fresh_m).min() / jump.max_wear_per_jump_m)
+    jumps = float((limits - fresh_m).min() / max_wear_per_jump_m)
     if jumps > MOST_JUMPS:
         raise ConfigError(
             "max-wear-per-jump-m",
             "",
-            f"{jump.max_wear_per_jump_m:g} m per jump takes {jumps:.2g} jumps to the limit. "
+            f"{max_wear_per_jump_m:g} m per jump takes {jumps:.2g} jumps to the limit. "
             f"Expected at most {MOST_JUMPS}",
         )
 
 
+# journals start up to this fraction of the smallest clearance from the centre
+_PERTURBED = 0.5
 _TRIALS = 4  # attempts to halve a jump before its error is accepted and reported
 
 
@@ -287,10 +275,8 @@ class LifeSettings:
         Gait cycles of each leg that are averaged before a jump.
     settle_cycles : int
         Gait cycles before the averaged ones, because the surfaces have changed.
-    perturb_fraction : float
-        Journals start up to this fraction of the smallest clearance from the centre.
-    jump : JumpControl
-        Limits of a jump: deepest change of a surface ``max_wear_per_jump_m``, error ``tolerance_m`` [m].
+    max_wear_per_jump_m : float
+        Deepest change of a surface that a jump may make [m]; its error may be a tenth of that.
     seed : int
         Seed of the legs' start positions.
     """
@@ -302,13 +288,9 @@ class LifeSettings:
     settle_cycles: int = quantity(
         "", "gait cycles to settle on the changed surfaces before that", at_least=0, default=1
     )
-    perturb_fraction: float = quantity(
-        "",
-        "largest distance of a journal from the centre at the start, as a fraction of the smallest clearance",
-        within=(0.0, 1.0),
-        default=0.5,
+    max_wear_per_jump_m: float = quantity(
+        "m", "deepest change of a surface that a jump may make", above=0.0, default=3.0e-5
     )
-    jump: JumpControl = described("limits of a jump", factory=JumpControl)
     seed: int = quantity("", "seed of the starts", at_least=0, default=0)
 
 
@@ -388,13 +370,13 @@ class LifeRun:
             for i, setup in enumerate(self._setups)
         ]
         self._polynomials = []
-        perturb_m = self.settings.perturb_fraction * float(self.fresh_m.min())
+        perturb_m = _PERTURBED * float(self.fresh_m.min())
         for leg, stepper in zip(legs, self._steppers, strict=True):
             attrs.evolve(leg, perturb_m=perturb_m).start(stepper)
             self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
         start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
         now = self._now = self._probe(start)
-        self._wish = longest_jump(now.rate, self.settings.jump)
+        self._wish = longest_jump(now.rate, self.settings.max_wear_per_jump_m)
         self.points = [now]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
@@ -405,13 +387,16 @@ class LifeRun:
         SimulationError
             If the motion diverges.
         """
-        control, last, now = self.settings.jump, self.points[-1], self._now
-        cycles = min(self._wish, longest_jump(now.rate, control), most_cycles)
+        most_m, last, now = self.settings.max_wear_per_jump_m, self.points[-1], self._now
+        tolerance_m, cycles = (
+            _TOLERATED * most_m,
+            min(self._wish, longest_jump(now.rate, most_m), most_cycles),
+        )
         for trial in range(_TRIALS):
             then = self._probe(last.depth + cycles * now.rate.depth)
             error = float(jump_error(now.rate, then.rate, cycles).max())
-            wish = next_jump(cycles, error, control)
-            if error <= control.tolerance_m or trial == _TRIALS - 1:
+            wish = next_jump(cycles, error, tolerance_m)
+            if error <= tolerance_m or trial == _TRIALS - 1:
                 break
             cycles = wish
         point = attrs.evolve(
@@ -455,8 +440,7 @@ class LifeRun:
             worn.append([setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)])
             archard.append([statistics.integral[joints, ARCHARD] for statistics in statistics_of_all])
             peak.append([statistics.peak[joints] for statistics in statistics_of_all])
-        smooth_deg = self.settings.jump.smooth_deg
-        rates = [wear_rate(one, smooth_deg) for one in self._by_part(worn)]
+        rates = [wear_rate(one, _SMOOTH_DEG) for one in self._by_part(worn)]
         return LifePoint(
             depth=depth,
             rate=mean_rate(rates, self._shares),
@@ -514,7 +498,7 @@ def simulate_life(
         If the motion diverges, or the life takes more than `MOST_JUMPS` jumps.
     """
     limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.clearance_joints))
-    check_life(run.clearance_joints, run.fresh_m, run.radius_m, limits, run.settings.jump)
+    check_life(run.clearance_joints, run.fresh_m, run.radius_m, limits, run.settings.max_wear_per_jump_m)
     while run.points[-1].cycles < horizon_cycles:
         if len(run.points) > MOST_JUMPS:
             raise SimulationError(

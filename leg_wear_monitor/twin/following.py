@@ -199,15 +199,10 @@ _TURN = 2.0 * math.pi
 
 
 @kernel
-def in_turn(angle):
-    """Crank angle [rad] in [0, 2 pi)."""
-    return angle - _TURN * math.floor(angle / _TURN)
-
-
-@kernel
 def phase_of(angle, phases):
     """Index below ``phases`` of a crank angle [rad]."""
-    return min(int(in_turn(angle) / _TURN * phases), phases - 1)
+    within = angle - _TURN * math.floor(angle / _TURN)
+    return min(int(within / _TURN * phases), phases - 1)
 
 
 # Low-pass filter of measured and predicted drive torque, two first-order stages (physics.md section 9).

@@ -45,7 +45,7 @@ def test_friction_of_the_drive_adds_to_its_torque() -> None:
 
 def test_a_push_of_the_ground_changes_the_torque() -> None:
     """By its work over the way of the toe: a tenth of a turn moves it some centimetres up or down."""
-    plain, pushed = (SyntheticLeg(GaitConfig(load=LoadConfig(toe_force_n=force))) for force in (0.0, 100.0))
+    plain, pushed = (SyntheticLeg(GaitConfig(load=LoadConfig(ground_n=force))) for force in (0.0, 100.0))
     changes = [
         pushed.advance(t).torque_impulse - plain.advance(t).torque_impulse for t in (0.1, 0.2, 0.3, 0.4, 0.5)
     ]
@@ -100,7 +100,10 @@ def test_a_knock_opens_one_joint_at_its_time() -> None:
             {"mechanism": "four_bar", "load": LoadConfig(person_kg=80.0)},
             "four_bar.yaml: bodies: has no thigh",
         ),
-        ({"mechanism": "slider_crank", "load": LoadConfig(toe_force_n=1.0)}, "gait: load.toe_force_n: slid"),
+        (
+            {"mechanism": "slider_crank", "load": LoadConfig(ground_n=1.0)},
+            "slider_crank.yaml: bodies: has no p",
+        ),
     ],
 )
 def test_what_the_leg_cannot_be_is_refused_in_a_line(changes: dict[str, object], line: str) -> None:

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.life.life import (
-    JumpControl,
     WearRate,
     jump_error,
     longest_jump,
@@ -50,9 +49,8 @@ def test_a_rate_is_the_mean_and_its_scatter_falls_with_the_number_of_cycles():
 
 
 def test_no_jump_goes_deeper_than_it_may():
-    control = JumpControl(max_wear_per_jump_m=1e-5)
-    assert longest_jump(rate(2e-9), control) == pytest.approx(5000.0)
-    assert longest_jump(rate(0.0), control) == np.inf
+    assert longest_jump(rate(2e-9), 1e-5) == pytest.approx(5000.0)
+    assert longest_jump(rate(0.0), 1e-5) == np.inf
 
 
 def test_scatter_alone_is_no_error():
@@ -62,8 +60,8 @@ def test_scatter_alone_is_no_error():
 
 @given(st.floats(1.0, 1e6), st.floats(0.0, 1e-3))
 def test_a_jump_shrinks_beyond_its_tolerance_and_changes_by_bounded_factors(cycles, error):
-    control = JumpControl(tolerance_m=1e-6)
-    after = next_jump(cycles, error, control)
+    tolerance = 1e-6
+    after = next_jump(cycles, error, tolerance)
     assert 0.29 * cycles <= after <= 2.01 * cycles
-    if error > control.tolerance_m:
+    if error > tolerance:
         assert after < cycles

@@ -13,7 +13,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import Leg, prepare
 from leg_wear_monitor.life import life as life_module
-from leg_wear_monitor.life.life import JumpControl, LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import pressure_speed
 
 SHORT = LifeSettings(legs=2, cycles=3, settle_cycles=1)
@@ -108,7 +108,7 @@ def test_jumps_meet_every_single_cycle(leg):
         )
         assert status[0] == DONE
     every = setup.surfaces.depth.mean(axis=2).sum(axis=1)
-    settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(max_wear_per_jump_m=2e-5))
+    settings = LifeSettings(legs=2, cycles=5, max_wear_per_jump_m=2e-5)
     run = LifeRun(leg, settings, clearances=("A", "B"), wear_factor=factor)
     simulate_life(run, limit_m=9.0e-3, horizon_cycles=float(cycles))
     assert run.points[-1].cycles == pytest.approx(cycles)
@@ -144,7 +144,7 @@ def test_every_joint_has_a_limit_of_its_own(lived):
 
 
 def test_jumps_too_short_to_reach_the_limit_are_refused(leg):
-    run = LifeRun(leg, attrs.evolve(SHORT, jump=JumpControl.of(1e-12)), clearances=("A",))
+    run = LifeRun(leg, attrs.evolve(SHORT, max_wear_per_jump_m=1e-12), clearances=("A",))
     with pytest.raises(ConfigError, match=r"^max-wear-per-jump-m: 1e-12 m per jump takes 3e\+08 jumps"):
         simulate_life(run, limit_m=6e-4, horizon_cycles=1e9)
 

@@ -82,30 +82,26 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     common.say(json_file, life_lines(result, limit_m, document["validity"]), written)
 
 
-def _lives(
-    leg: "Mechanism", ensemble_size: int, max_wear_per_jump_m: float | None, duty: str | None, **options: Any
-) -> "Lives":
+def _lives(leg: "Mechanism", ensemble_size: int, duty: str | None, **options: Any) -> "Lives":
     """Check the options, and simulate the lives."""
-    import attrs
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.life import JumpControl, LifeSettings, check_life, simulate_lives
+    from leg_wear_monitor.life.life import LifeSettings, check_life, simulate_lives
     from leg_wear_monitor.life.result import Duty
     from leg_wear_monitor.mechanism.materials import check_wear_is_known
 
     # options that were not given have the defaults of LifeSettings
-    given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
+    names = "legs", "cycles", "max_wear_per_jump_m"
+    given = {name: value for name in names if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
-    if max_wear_per_jump_m is not None:
-        settings = attrs.evolve(settings, jump=JumpControl.of(max_wear_per_jump_m))
     loads = None if duty is None else Duty.parse(duty)
     # bad settings are refused before the kernels are compiled, which takes a while
     joints = clearance_settings(leg, leg.clearance_joints)
     check_wear_is_known(leg, leg.clearance_joints)
     sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
     clearance_m, radius_m = sizes.reshape(-1, 2).T
-    check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.jump)
+    check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.max_wear_per_jump_m)
     with common.compilation(), common.progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, ensemble_size, progress=progress, duty=loads, **options))
 

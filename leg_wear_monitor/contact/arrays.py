@@ -68,7 +68,7 @@ def clearance_settings(
     Raises
     ------
     ConfigError
-        Names the joint without settings, or the invalid setting.
+        Names the invalid setting.
     """
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     changes = {key: given[name] for name, key in _KEYS.items() if name in given}
@@ -76,13 +76,6 @@ def clearance_settings(
     options_of = {key: name.replace("_", "-") for name, key in (_KEYS | _OF_FRICTION).items()}
     settings = {}
     for name in joints:
-        if name not in mechanism.clearances:
-            known = ", ".join(mechanism.clearances) or "none"
-            raise ConfigError(
-                "clearances",
-                "",
-                f"{name!r} has no clearance settings in {mechanism.source}. Expected some of: {known}",
-            )
         own = mechanism.clearances[name]
         try:
             friction = attrs.evolve(own.friction, **of_friction)

@@ -5,16 +5,15 @@ and size, or the mean of a measured force.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import kernel
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force, under_trial_force
-from leg_wear_monitor.dynamics.clearance.tables import POINTS, Basis, build_basis, build_tables
+from leg_wear_monitor.dynamics.clearance.stepper import loaded_tables, put_force
+from leg_wear_monitor.dynamics.clearance.tables import POINTS
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.person import PHASES, nominal_stance, upwards
@@ -130,15 +129,14 @@ class FootLoad:
         is_measured: bool = False,
         is_of_foot: bool = False,
     ) -> None:
-        basis = build_basis(linkage, contacts, loaded=under_trial_force(linkage))
-        self.tables = build_tables(linkage, contacts, basis=basis)
+        self.tables, self._loaded = loaded_tables(linkage, contacts)
         self.signature, self.acting_n = np.zeros(POINTS + 1), np.zeros((POINTS, 2))
         self._contacts, self._load = contacts, 0.0
         self._known, self._is_of_foot = np.zeros((0, 2)), is_of_foot
         rows = POINTS if is_measured and linkage.mechanism.toe else 0
         axis, up = _axis(linkage, is_of_foot), upwards(linkage.mechanism)
         self.rows = LoadRows(axis, up, np.zeros((rows, 2)), np.zeros(rows))
-        self._set_up(linkage, basis)
+        self._set_up(linkage)
 
     def rebuild(self, linkage: Linkage, known: Floats) -> None:
         """Set the tables, in place, for a leg with other masses or lengths under the same load.
@@ -152,25 +150,19 @@ class FootLoad:
             stance.
         """
         self._known, load, measured = known, self._load, self.acting_n
-        basis = build_basis(linkage, self._contacts, loaded=under_trial_force(linkage))
-        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(
-            self.tables, build_tables(linkage, self._contacts, basis=basis), strict=True
-        )
-        for own, table in pairs:
-            own[...] = table
+        _, self._loaded = loaded_tables(linkage, self._contacts, self.tables)
         self.rows.axis[:] = _axis(linkage, self._is_of_foot)
         self._load, self.acting_n = 0.0, np.zeros((POINTS, 2))
-        self._set_up(linkage, basis)
+        self._set_up(linkage)
         if len(self.rows.mean):
             self._put(measured)
         self.set(load)
 
-    def _set_up(self, linkage: Linkage, basis: Basis) -> None:
-        """Compute the effect of a load on the tables, which must be those without a load."""
+    def _set_up(self, linkage: Linkage) -> None:
+        """Compute the motion of the toe, and the force and the torque of a load of 1 N."""
         self.toe_m = np.zeros((POINTS, 2))
         if linkage.mechanism.toe:
             self.toe_m = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *linkage.mechanism.toe)[1]
-        self._loaded = loaded_tables(linkage, self._contacts, self.tables, basis)
         known = self._known
         known = known / (known @ self.rows.up).max() if known.size else stance_shape(linkage)
         self._force, self.signature[:] = known, load_signature(linkage, known)

@@ -17,10 +17,9 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     LoadedTable,
     loaded_tables,
     put_force,
-    under_trial_force,
 )
 from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables, is_damped
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables, is_damped
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -423,11 +422,10 @@ class LegSimulation:
         linkage, contacts = self._setup.linkage, self._setup.contacts
         contacts.wear_coefficient[:] = 0.0
         self._fresh = contacts.clearance.copy()
-        loaded = under_trial_force(linkage) if parameters.load.size else ()
-        basis = build_basis(linkage, contacts, loaded=loaded)
-        self._tables = build_tables(linkage, contacts, basis=basis)
         if parameters.load.size:
-            self._loaded = loaded_tables(linkage, contacts, self._tables, basis)
+            self._tables, self._loaded = loaded_tables(linkage, contacts)
+        else:
+            self._tables = build_tables(linkage, contacts)
         self._parameters = parameters
 
 

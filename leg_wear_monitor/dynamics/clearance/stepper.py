@@ -1,12 +1,13 @@
 """Stepper of the leg in clearance coordinates: advance, observe, snapshot (physics.md section 7)."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import compile_for
 from leg_wear_monitor.compiled.vectors import padded
@@ -32,7 +33,6 @@ from leg_wear_monitor.dynamics.clearance.model import (
 from leg_wear_monitor.dynamics.clearance.tables import (
     COARSER,
     UNDER_LOAD,
-    Basis,
     ClearanceTables,
     build_basis,
     build_tables,
@@ -400,28 +400,31 @@ def under_trial_force(linkage: Linkage) -> list[Linkage]:
 
 
 def loaded_tables(
-    linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, basis: Basis | None = None
-) -> list[LoadedTable]:
-    """The tables of `UNDER_LOAD`, which a force on the toe changes.
+    linkage: Linkage, contacts: ContactArrays, into: ClearanceTables | None = None
+) -> tuple[ClearanceTables, list[LoadedTable]]:
+    """Tables of a linkage without a force on its toe, and those of them that a force changes.
 
     Parameters
     ----------
     linkage : Linkage
         Without a toe, no force acts.
     contacts : ContactArrays
-    tables : ClearanceTables
-        Tables of this linkage; `put_force` changes them.
-    basis : Basis, optional
-        Basis of these tables, loaded as `under_trial_force`.
+    into : ClearanceTables, optional
+        Tables of the same joints that are overwritten.
     """
-    basis = basis or build_basis(linkage, contacts, loaded=under_trial_force(linkage))
+    basis = build_basis(linkage, contacts, under_trial_force(linkage))
+    tables = build_tables(linkage, contacts, basis)
+    if into is not None:
+        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(into, tables, strict=True)
+        for own, table in pairs:
+            own[...] = table
+        tables = into
     found = []
     for name, make in UNDER_LOAD.items():
-        table = getattr(tables, name)
-        rows = table.reshape(len(table), -1)  # a view
+        rows = getattr(tables, name).reshape(len(getattr(tables, name)), -1)  # a view
         slopes = [_slope(make(linkage, contacts, each), rows) for each in basis.loaded]
         found.append(_loaded(rows, slopes))
-    return found
+    return tables, found
 
 
 def put_force(loaded: Sequence[LoadedTable], force: Floats) -> None:

@@ -249,8 +249,9 @@ def _limited_by(
     bushing: Clearance, load: BushingLoad, peak_pa: float, wear_h: float | None, rating_h: float | None
 ) -> str:
     """The reason for which the life of a bushing ends, or is not known."""
-    if load.excesses:
-        return max(load.excesses, key=lambda each: each.value / each.limit).name
+    fractions = load.fractions
+    if max(fractions.values(), default=0.0) > 1.0:
+        return max(fractions, key=lambda name: fractions[name])
     limits = load_material(bushing.material).limits if bushing.material else None
     if limits and limits.static_pressure and peak_pa > limits.static_pressure.si:
         return "impact"

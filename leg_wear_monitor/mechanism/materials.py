@@ -420,28 +420,6 @@ def _si(unit: str, default: Any = attrs.NOTHING) -> Any:
     return attrs.field(default=default, metadata={"unit": unit})
 
 
-@attrs.frozen
-class Excess:
-    """A load beyond a limit.
-
-    Attributes
-    ----------
-    name : str
-        ``p``, ``v`` or ``p v``.
-    value, limit : float
-    unit : str
-        Unit of both.
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-
-    def __str__(self) -> str:
-        return f"{self.name} {self.value:.3g} {self.unit} above {self.limit:.3g}"
-
-
 @attrs.frozen(kw_only=True)
 class BushingLoad:
     """Pressure and sliding speed in a joint over a gait cycle, and the limits of its material.
@@ -479,26 +457,26 @@ class BushingLoad:
     outside_limits: str | None = None
 
     @property
-    def compared(self) -> tuple[Excess, ...]:
-        """Every value that has a limit, beyond it or not."""
-        limited = (
-            ("p", self.p99_pressure_pa, self.pressure_limit_pa, "Pa"),
-            ("v", self.mean_sliding_speed_mps, self.sliding_speed_limit_mps, "m/s"),
-            ("p v", self.mean_pressure_speed_pa_mps, self.pressure_speed_limit_pa_mps, "Pa m/s"),
-        )
-        return tuple(
-            Excess(name, value, limit, unit) for name, value, limit, unit in limited if limit is not None
-        )
+    def compared(self) -> dict[str, tuple[float, float, str]]:
+        """Value, limit and unit of each of ``p``, ``v`` and ``p v`` that has a limit, beyond it or not."""
+        limited = {
+            "p": (self.p99_pressure_pa, self.pressure_limit_pa, "Pa"),
+            "v": (self.mean_sliding_speed_mps, self.sliding_speed_limit_mps, "m/s"),
+            "p v": (self.mean_pressure_speed_pa_mps, self.pressure_speed_limit_pa_mps, "Pa m/s"),
+        }
+        return {
+            name: (value, most, unit) for name, (value, most, unit) in limited.items() if most is not None
+        }
 
     @property
-    def excesses(self) -> tuple[Excess, ...]:
-        """Values beyond their limits."""
-        return tuple(each for each in self.compared if each.value > each.limit)
+    def fractions(self) -> dict[str, float]:
+        """Each value that has a limit as a fraction of it."""
+        return {name: value / limit for name, (value, limit, _) in self.compared.items()}
 
     @property
     def fraction(self) -> float | None:
         """Largest value as a fraction of its limit; None without limits."""
-        return max((each.value / each.limit for each in self.compared), default=None)
+        return max(self.fractions.values(), default=None)
 
 
 @attrs.frozen(kw_only=True)
@@ -560,9 +538,13 @@ class Bushing:
             sliding_speed_limit_mps=self.sliding_speed_mps,
             pressure_speed_limit_pa_mps=self.pressure_speed_pa_mps,
         )
-        if not load.excesses:
+        beyond = ", ".join(
+            f"{name} {value:.3g} {unit} above {limit:.3g}"
+            for name, (value, limit, unit) in load.compared.items()
+            if value > limit
+        )
+        if not beyond:
             return load
-        beyond = ", ".join(map(str, load.excesses))
         return attrs.evolve(load, outside_limits=f"outside the limits of {self.material}: {beyond}")
 
 

@@ -37,7 +37,7 @@ def test_the_fraction_is_that_of_the_value_nearest_its_limit() -> None:
 def test_without_limits_nothing_is_outside_and_there_is_no_fraction() -> None:
     for material in ("", "steel-on-steel-greased-mild"):
         load = loaded(1e12, 1e6, 1e15, material)
-        assert (load.outside_limits, load.fraction, load.compared) == (None, None, ())
+        assert (load.outside_limits, load.fraction, load.compared) == (None, None, {})
 
 
 def test_one_that_gives_a_static_limit_only_is_held_to_it() -> None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from functools import cache
 from typing import Any
 
 import attrs
@@ -182,21 +181,13 @@ class CycleScatter:
 
 def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
     """Numbers in a part of a result that add up over cycles, with their paths."""
-    if isinstance(part, float):
+    if isinstance(part, float) and path.rpartition(".")[2] not in _ONE_SAMPLE:
         yield path, part
     elif isinstance(part, dict):
         for name, value in part.items():
             yield from _numbers(f"{path}.{name}", value)
-    else:
-        for name in _summed(part.__class__):
-            yield from _numbers(f"{path}.{name}", getattr(part, name))
-
-
-@cache
-def _summed(kind: type) -> tuple[str, ...]:
-    """Names of the fields of a part of a result that may add up over cycles; empty without fields."""
-    fields = attrs.fields(kind) if attrs.has(kind) else ()
-    return tuple(field.name for field in fields if field.name not in _ONE_SAMPLE)
+    elif attrs.has(type(part)):
+        yield from _numbers(path, attrs.asdict(part, recurse=False))
 
 
 def joint_statistics(

@@ -37,9 +37,8 @@ from leg_wear_monitor.dynamics.statistics import (
 )
 from leg_wear_monitor.errors import AssemblyError, ConfigError, ConfigWarning, SimulationError, did_you_mean
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.loader import load_mechanism, suspects
 from leg_wear_monitor.mechanism.materials import bushing_of
-from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import (
     TURN,
     IdealMotion,

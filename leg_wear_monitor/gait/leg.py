@@ -131,15 +131,6 @@ def _waves(coefficients: tuple[float, ...], s: Floats) -> Floats:
 _RIPPLE_PER_TURN = 2.0  # waves: the load of a leg has two swings a turn
 
 
-class _Stretch(NamedTuple):
-    """Speed transition: start time [s], ripple-free start angle [rad], start and end speed [rad/s]."""
-
-    since: float
-    angle: float
-    before: float
-    after: float
-
-
 class Pace:
     """Motion of the crank over time, from angle 0.
 
@@ -151,9 +142,10 @@ class Pace:
         self._ramp = config.ramp_s
         self._ripple = config.ripple
         speeds = [rpm * TURN / 60.0 for rpm in config.speeds_rpm]
-        self._stretches, self._since = [_Stretch(0.0, 0.0, speeds[0], speeds[0])], [0.0]
+        # of each change of speed: start time [s], ripple-free start angle [rad], start and end speed [rad/s]
+        self._stretches, self._since = [(0.0, 0.0, speeds[0], speeds[0])], [0.0]
         for (_, end), (before, after) in zip(pairwise(config.times_s), pairwise(speeds), strict=True):
-            self._stretches.append(_Stretch(end, self._even(end).angle, before, after))
+            self._stretches.append((end, self._even(end).angle, before, after))
             self._since.append(end)
 
     def at(self, t: float) -> CrankMotion:
@@ -167,20 +159,16 @@ class Pace:
 
     def _even(self, t: float) -> CrankMotion:
         """Ripple-free motion: a smooth speed step 10 u^3 - 15 u^4 + 6 u^5, then constant speed."""
-        last = self._stretches[bisect_right(self._since, t) - 1]
-        tau, step = t - last.since, last.after - last.before
+        since, angle, before, after = self._stretches[bisect_right(self._since, t) - 1]
+        tau, step = t - since, after - before
         if tau >= self._ramp:
-            angle = (
-                last.angle + 0.5 * (last.before + last.after) * self._ramp + last.after * (tau - self._ramp)
-            )
-            return CrankMotion(angle, last.after, 0.0)
+            angle = angle + 0.5 * (before + after) * self._ramp + after * (tau - self._ramp)
+            return CrankMotion(angle, after, 0.0)
         u = tau / self._ramp
         risen = u * u * u * (10.0 + u * (6.0 * u - 15.0))
         area = u**4 * (2.5 + u * (u - 3.0)) * self._ramp
         slope = 30.0 * u * u * (1.0 + u * (u - 2.0)) / self._ramp
-        return CrankMotion(
-            last.angle + last.before * tau + step * area, last.before + step * risen, step * slope
-        )
+        return CrankMotion(angle + before * tau + step * area, before + step * risen, step * slope)
 
 
 _LONGEST_PIECE_S = 2.0e-3  # longest drive polynomial: follows a ripple of 50 Hz to 1e-9 rad

@@ -36,8 +36,8 @@ from leg_wear_monitor.dynamics.simulation import Leg, advance_batch, prepare_leg
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.life.result import Duty, Life
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.loader import limit_fault, suspects
 from leg_wear_monitor.mechanism.materials import check_wear_is_known
-from leg_wear_monitor.mechanism.plausible import limit_fault, suspects
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 

@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats, com_poses, compile_arrays
 from leg_wear_monitor.mechanism.constraints import select_rows
-from leg_wear_monitor.mechanism.plausible import suspects
+from leg_wear_monitor.mechanism.loader import suspects
 from leg_wear_monitor.mechanism.position import (
     TURN,
     Linkage,

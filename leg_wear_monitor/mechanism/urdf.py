@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator
 from xml.etree import ElementTree
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, body_names, point_from_com
@@ -26,24 +25,9 @@ from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, V
 _RADIUS = 0.03  # radius of the cylinders as a fraction of the longest distance between points of a body
 
 
-@attrs.frozen
-class Branch:
-    """A joint of the tree.
-
-    Attributes
-    ----------
-    joint, parent, child : str
-        Its name, and its bodies.
-    """
-
-    joint: str
-    parent: str
-    child: str
-
-
-def tree(mechanism: Mechanism) -> tuple[Branch, ...]:
-    """Joint that carries each body, starting at the ground; all other joints close the loops."""
-    found: list[Branch] = []
+def tree(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
+    """Parent and child body of each joint that carries a body, from the ground; other joints close loops."""
+    found: dict[str, tuple[str, str]] = {}
     reached = [GROUND]
     for parent in reached:  # grows meanwhile: the nearest to the ground come first
         for joint in mechanism.joints:
@@ -53,8 +37,8 @@ def tree(mechanism: Mechanism) -> tuple[Branch, ...]:
             child = sides[0] if sides[1] == parent else sides[1]
             if child not in reached:
                 reached.append(child)
-                found.append(Branch(joint, parent, child))
-    return tuple(found)
+                found[joint] = parent, child
+    return found
 
 
 def joint_positions(linkage: Linkage, q: Floats) -> dict[str, Floats]:
@@ -73,18 +57,18 @@ def joint_positions(linkage: Linkage, q: Floats) -> dict[str, Floats]:
     """
     mechanism, found = linkage.mechanism, {}
     number = {body: k for k, body in enumerate(body_names(mechanism))}
-    for branch in tree(mechanism):
-        parent, child = q[:, number[branch.parent]], q[:, number[branch.child]]
-        if not isinstance(mechanism.joints[branch.joint], PrismaticJoint):
-            found[branch.joint] = child[:, 2] - parent[:, 2]
+    for joint, bodies in tree(mechanism).items():
+        parent, child = (q[:, number[body]] for body in bodies)
+        if not isinstance(mechanism.joints[joint], PrismaticJoint):
+            found[joint] = child[:, 2] - parent[:, 2]
             continue
         arm = [
-            body[:, :2] + rotated(point_from_com(mechanism, name, branch.joint), body[:, 2])
-            for name, body in ((branch.parent, parent), (branch.child, child))
+            body[:, :2] + rotated(point_from_com(mechanism, name, joint), body[:, 2])
+            for name, body in zip(bodies, (parent, child), strict=True)
         ]
-        guide, axis = _guide(mechanism, branch.joint)
+        guide, axis = _guide(mechanism, joint)
         along = rotated(axis, q[:, number[guide], 2])
-        found[branch.joint] = ((arm[1] - arm[0]) * along).sum(axis=1)
+        found[joint] = ((arm[1] - arm[0]) * along).sum(axis=1)
     return found
 
 
@@ -110,12 +94,12 @@ def urdf(mechanism: Mechanism) -> str:
     """
     branches = tree(mechanism)
     angle = dict(zip(body_names(mechanism), assemble(build_linkage(mechanism))[:, 2].tolist(), strict=True))
-    carried = {branch.child: branch.joint for branch in branches}
+    carried = {child: joint for joint, (_, child) in branches.items()}
     origins = {body: mechanism.points_of(body)[joint] for body, joint in carried.items()}
     origins[GROUND] = (0.0, 0.0)
     robot = ElementTree.Element("robot", name=mechanism.name)
     robot.extend(_link(mechanism, body, origins[body]) for body in origins)
-    robot.extend(_joint(mechanism, branch, origins, angle) for branch in branches)
+    robot.extend(_joint(mechanism, joint, *sides, origins, angle) for joint, sides in branches.items())
     for joint in mechanism.joints:
         if joint not in carried.values():
             for body in mechanism.sides(joint):
@@ -159,19 +143,24 @@ def _sides(mechanism: Mechanism, body: str) -> Iterator[tuple[Vector, Vector]]:
 
 
 def _joint(
-    mechanism: Mechanism, branch: Branch, origins: dict[str, Vector], angle: dict[str, float]
+    mechanism: Mechanism,
+    name: str,
+    parent: str,
+    child: str,
+    origins: dict[str, Vector],
+    angle: dict[str, float],
 ) -> ElementTree.Element:
-    slides = isinstance(mechanism.joints[branch.joint], PrismaticJoint)
+    slides = isinstance(mechanism.joints[name], PrismaticJoint)
     kind = "prismatic" if slides else "continuous"
-    joint = ElementTree.Element("joint", name=branch.joint, type=kind)
-    turned = angle[branch.child] - angle[branch.parent] if slides else 0.0
-    _origin(joint, mechanism.points_of(branch.parent)[branch.joint], origins[branch.parent], turned)
-    ElementTree.SubElement(joint, "parent", link=branch.parent)
-    ElementTree.SubElement(joint, "child", link=branch.child)
+    joint = ElementTree.Element("joint", name=name, type=kind)
+    turned = angle[child] - angle[parent] if slides else 0.0
+    _origin(joint, mechanism.points_of(parent)[name], origins[parent], turned)
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
     if slides:
         # the axis of a joint is given in its own frame, which has the child's directions
-        guide, axis = _guide(mechanism, branch.joint)
-        x, y = axis if guide == branch.child else rotated(axis, -turned).tolist()
+        guide, axis = _guide(mechanism, name)
+        x, y = axis if guide == child else rotated(axis, -turned).tolist()
         ElementTree.SubElement(joint, "axis", xyz=f"{-x:.12g} 0 {y:.12g}")
         far = f"{_reach(mechanism):.9g}"
         ElementTree.SubElement(joint, "limit", lower=f"-{far}", upper=far, effort="0", velocity="0")

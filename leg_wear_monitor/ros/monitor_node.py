@@ -17,8 +17,7 @@ from std_srvs.srv import Trigger
 
 from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
 from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
-from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.plausible import doubts
+from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig

@@ -113,27 +113,19 @@ class LoadEstimate:
 
     Attributes
     ----------
-    state : (9,) array
-        The four values, their variances, and the load that acts on the leg.
+    values : (4,) array
+    acting : float
+        The load that acts on the leg [N].
     """
 
     def __init__(self) -> None:
-        self.state = np.concatenate([np.zeros(REGRESSORS), _UNKNOWN**2, np.zeros(1)])
-
-    @property
-    def values(self) -> Floats:
-        """The four values; a view."""
-        return self.state[:REGRESSORS]
+        self.values, self.acting = np.zeros(REGRESSORS), 0.0
+        self._variance = _UNKNOWN**2
 
     @property
     def sigma(self) -> Floats:
-        """Their standard deviations (4,)."""
-        return np.asarray(np.sqrt(self.state[REGRESSORS:-1]))
-
-    @property
-    def acting(self) -> float:
-        """The load that acts on the leg [N]."""
-        return float(self.state[-1])
+        """Standard deviations (4,) of the values."""
+        return np.asarray(np.sqrt(self._variance))
 
     @property
     def room(self) -> tuple[float, float]:
@@ -142,7 +134,7 @@ class LoadEstimate:
 
     def take(self, found: Floats, sigma: Floats, acts: bool) -> None:
         """Update by a cycle's estimate (4,); ``acts``: whether a significant load acts on the leg."""
-        values, variance = self.values, self.state[REGRESSORS:-1]
+        values, variance = self.values, self._variance
         measured = found.copy()
         measured[LOAD] += self.acting
         variance += _DRIFT**2
@@ -155,7 +147,7 @@ class LoadEstimate:
         values[LOAD] = np.clip(values[LOAD], *LOADS_N)
         values[LOAD_FRICTION] = np.clip(values[LOAD_FRICTION], 0.0, MOST_LOAD_FRICTION)
         enough = (_CEASES_BELOW if self.acting else _ACTS_ABOVE) * self.sigma[LOAD]
-        self.state[-1] = values[LOAD] if acts and abs(values[LOAD]) > enough else 0.0
+        self.acting = float(values[LOAD]) if acts and abs(values[LOAD]) > enough else 0.0
 
 
 def clear_run_statistics(statistics: RunStatistics) -> None:

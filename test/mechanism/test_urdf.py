@@ -57,15 +57,15 @@ def test_cut_loops_close_and_bodies_are_where_they_are_in_the_linkage(name):
     motion = ideal_motion(linkage, angles, 1.0)
     positions = joint_positions(linkage, motion.q)
     robot = ElementTree.fromstring(urdf(mechanism))
-    carried = {branch.joint for branch in tree(mechanism)}
+    carried = set(tree(mechanism))
     for step in range(STEPS):
         here = frames(robot, {joint: float(values[step]) for joint, values in positions.items()})
         for joint in set(mechanism.joints) - carried:
             one, other = (here[f"{joint}_on_{body}"][:3, 3] for body in mechanism.sides(joint))
             assert np.abs(one - other).max() < 1e-6
-        for branch in tree(mechanism):
-            expected, _, _ = point_motion(motion, linkage, branch.child, branch.joint)
-            x, y, z = here[branch.child][:3, 3]
+        for joint, (_, child) in tree(mechanism).items():
+            expected, _, _ = point_motion(motion, linkage, child, joint)
+            x, y, z = here[child][:3, 3]
             assert (-x, z) == pytest.approx(tuple(expected[step]), abs=1e-6)
             assert y == 0.0
 

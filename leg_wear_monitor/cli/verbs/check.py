@@ -201,8 +201,7 @@ def _first_line(name: str) -> str:
 
 def _mechanism(name: str) -> str:
     """Load, assemble and turn a mechanism, and describe it."""
-    from leg_wear_monitor.mechanism.loader import load_mechanism, understood
-    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.loader import doubts, load_mechanism, understood
 
     leg = load_mechanism(name)
     with common.compilation():

@@ -61,8 +61,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     A few gait cycles are simulated, and their mean wear is applied over many. Single cycles are chaotic, so
     the values scatter; the scatter is reported.
     """
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
 
     names, limit_m = options.pop("clearances"), options["limit_m"]
     leg = common.with_clearance_joints(load_mechanism(mechanism), names)

@@ -113,8 +113,7 @@ def replay(
 def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
     import attrs
 
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts
     from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.forecast.growth import life_doubts

@@ -59,8 +59,7 @@ def _compute(settings: "Study", out: Path, workers: int | None, scheduler: str |
 
     from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
     from leg_wear_monitor.dynamics.simulation import simulate
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
     from leg_wear_monitor.studies.run import run_study
 
     leg = load_mechanism(settings.mechanism)
@@ -224,8 +223,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     """Simulate the motion of the leg, ideal or with clearances, and report forces and wear."""
     if options["cycles"] is not None and options["duration_s"] is not None:
         raise click.UsageError("--cycles and --duration cannot be combined")
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.mechanism.plausible import doubts, ratio_fault
+    from leg_wear_monitor.mechanism.loader import doubts, load_mechanism, ratio_fault
 
     leg = load_mechanism(mechanism)
     common.check_outputs(json_file, out)

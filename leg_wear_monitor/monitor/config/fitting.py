@@ -7,8 +7,8 @@ import attrs
 
 from leg_wear_monitor.configuration import Doubt, FieldError, doubts
 from leg_wear_monitor.errors import ConfigError, did_you_mean
+from leg_wear_monitor.mechanism.loader import limit_fault
 from leg_wear_monitor.mechanism.person import with_person
-from leg_wear_monitor.mechanism.plausible import limit_fault
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.inputs import INTERFACE, MAX_LAG_S
@@ -176,7 +176,7 @@ def _wrong_length(
     )
 
 
-# Usable parameters that are likely meant in a different unit; see also `mechanism.plausible`.
+# Usable parameters that are likely meant in a different unit; see also `mechanism.loader`.
 
 
 MOST_ACCELERATION = 1000.0  # impact forces of healthy legs stay as they are; at 5000 they reached 331 kN

@@ -8,7 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS
-from leg_wear_monitor.mechanism.plausible import measured_fault, sigma_fault
+from leg_wear_monitor.mechanism.loader import measured_fault, sigma_fault
 from leg_wear_monitor.mechanism.spec import Clearance
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.settings import Forecasting

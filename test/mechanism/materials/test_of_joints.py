@@ -9,9 +9,8 @@ from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.life import LifeRun
-from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.loader import doubts, parse_mechanism, shipped_mechanisms
 from leg_wear_monitor.mechanism.materials import bushing_of, regimes
-from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 DOCUMENT = YAML(typ="safe").load(shipped_mechanisms()["bionic_leg"])

@@ -201,8 +201,8 @@ def torque_statistics(sums: Record, settled: LoadEstimate, unexplained_nm: float
 
 def torque_profile(sums: Record, acting_n: float) -> TorqueProfile:
     """Torques of a cycle by phase; ``acting_n`` is the foot load that acted in the model [N]."""
-    number, measured, predicted, lever = sums.profile.copy()
-    return TorqueProfile(number, measured, predicted - acting_n * lever, lever)
+    number, angle, measured, predicted, lever = sums.profile.copy()
+    return TorqueProfile(number, angle, measured, predicted - acting_n * lever, lever)
 
 
 def load_profile(leg: Record) -> LoadProfile | None:

@@ -113,8 +113,8 @@ TORQUE_SUMS = np.dtype(
         ("along", "f8", (REGRESSORS,)),  # products of the regressors with the residual
         # for a sensor that samples instants: rows of weight, then weight times residual and regressors
         ("by_phase", "f8", (2 + REGRESSORS, PHASES)),
-        # before the low-pass filter: weight, measured torque, predicted torque, torque per load
-        ("profile", "f8", (4, FINE_PHASES)),
+        # before the low-pass filter: weight, crank angle, measured torque, predicted torque, torque per load
+        ("profile", "f8", (5, FINE_PHASES)),
     ]
 )
 """Sums over a gait cycle."""
@@ -199,10 +199,15 @@ _TURN = 2.0 * math.pi
 
 
 @kernel
+def in_turn(angle):
+    """Crank angle [rad] in [0, 2 pi)."""
+    return angle - _TURN * math.floor(angle / _TURN)
+
+
+@kernel
 def phase_of(angle, phases):
     """Index below ``phases`` of a crank angle [rad]."""
-    within = angle - _TURN * math.floor(angle / _TURN)
-    return min(int(within / _TURN * phases), phases - 1)
+    return min(int(in_turn(angle) / _TURN * phases), phases - 1)
 
 
 # Low-pass filter of measured and predicted drive torque, two first-order stages (physics.md section 9).
@@ -351,9 +356,10 @@ def add_to_profile(profile, angle, measured, predicted, lever, weight):
     """Add a measured and a predicted torque [N m] and the torque per load [N m/N] to the sums of a phase."""
     phase = phase_of(angle, profile.shape[1])
     profile[0, phase] += weight
-    profile[1, phase] += weight * measured
-    profile[2, phase] += weight * predicted
-    profile[3, phase] += weight * lever
+    profile[1, phase] += weight * in_turn(angle)
+    profile[2, phase] += weight * measured
+    profile[3, phase] += weight * predicted
+    profile[4, phase] += weight * lever
 
 
 @kernel

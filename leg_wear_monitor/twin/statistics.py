@@ -134,8 +134,9 @@ class TorqueProfile:
 
     Attributes
     ----------
-    number : (FINE_PHASES,) array
-        Samples in each phase, averages weighted by the time that they stand for.
+    number, angle_rad : (FINE_PHASES,) array
+        Samples in each phase, averages weighted by the time that they stand for, and the sum of their crank
+        angles.
     measured_nm, predicted_nm : (FINE_PHASES,) array
         Measured torque, and the torque of the model without a foot load.
     lever_m : (FINE_PHASES,) array
@@ -143,6 +144,7 @@ class TorqueProfile:
     """
 
     number: Floats
+    angle_rad: Floats
     measured_nm: Floats
     predicted_nm: Floats
     lever_m: Floats

@@ -1,4 +1,4 @@
-"""Messages as they lie in a bag: CDR (XCDR1, either byte order) of the input types, read in place.
+"""Messages as they lie in a bag: CDR (XCDR1, little endian) of the input types, read in place.
 
 A message is four bytes of encapsulation and a body; members are aligned relative to the start of the body
 (OMG DDS-XTypes 1.3, section 7.4.3). Positions are indices into one array of bytes that holds many messages.
@@ -49,28 +49,20 @@ _MOST_PADDING = 15
 
 
 @kernel
-def uint32(data, at, big):
+def uint32(data, at):
     """Integer of four bytes."""
-    if big:
-        low, high = at + 3, -1
-    else:
-        low, high = at, 1
     value = np.int64(0)
     for i in range(4):
-        value |= np.int64(data[low + high * i]) << (8 * i)
+        value |= np.int64(data[at + i]) << (8 * i)
     return value
 
 
 @kernel
-def float64(data, at, big):
+def float64(data, at):
     """Number of eight bytes."""
-    if big:
-        low, high = at + 7, -1
-    else:
-        low, high = at, 1
     bits = np.uint64(0)
     for i in range(8):
-        bits |= np.uint64(data[low + high * i]) << np.uint64(8 * i)
+        bits |= np.uint64(data[at + i]) << np.uint64(8 * i)
     return np.uint64(bits).view(np.float64)
 
 
@@ -81,29 +73,29 @@ def aligned(at, size, origin):
 
 
 @kernel
-def counted(data, at, end, origin, big):
+def counted(data, at, end, origin):
     """Length that stands before a text or a sequence, and the position behind it."""
     if at < 0:
         return np.int64(0), np.int64(-1)
     at = aligned(at, 4, origin)
     if at + 4 > end:
         return np.int64(0), np.int64(-1)
-    return uint32(data, at, big), np.int64(at + 4)
+    return uint32(data, at), np.int64(at + 4)
 
 
 @kernel
-def text(data, at, end, origin, big):
+def text(data, at, end, origin):
     """Length of a text without its closing zero, its first byte, and the position behind it."""
-    size, at = counted(data, at, end, origin, big)
+    size, at = counted(data, at, end, origin)
     if at < 0 or size > end - at:
         return np.int64(0), np.int64(-1), np.int64(-1)
     return max(size - 1, np.int64(0)), at, at + size
 
 
 @kernel
-def numbers(data, at, end, origin, big):
+def numbers(data, at, end, origin):
     """Length of a sequence of float64, its first byte, and the position behind it."""
-    count, at = counted(data, at, end, origin, big)
+    count, at = counted(data, at, end, origin)
     if at < 0 or count == 0:
         return np.int64(0), at, at
     at = aligned(at, 8, origin)
@@ -113,27 +105,27 @@ def numbers(data, at, end, origin, big):
 
 
 @kernel
-def header(data, origin, end, big):
+def header(data, origin, end):
     """Stamp of a std_msgs/Header [ns], and the position behind the header."""
     if origin + 8 > end:
         return np.int64(0), np.int64(-1)
-    seconds = uint32(data, origin, big)
+    seconds = uint32(data, origin)
     if seconds >= 2**31:
         seconds -= 2**32
-    stamp = seconds * 1_000_000_000 + uint32(data, origin + 4, big)
-    _, _, at = text(data, origin + 8, end, origin, big)
+    stamp = seconds * 1_000_000_000 + uint32(data, origin + 4)
+    _, _, at = text(data, origin + 8, end, origin)
     return stamp, at
 
 
 @kernel
-def names(data, at, end, origin, big, wanted):
+def names(data, at, end, origin, wanted):
     """Number of texts, index of the wanted text (-1 unless it occurs once), position after them."""
-    count, at = counted(data, at, end, origin, big)
+    count, at = counted(data, at, end, origin)
     if at < 0 or count > (end - at) // 4:
         return np.int64(0), np.int64(-1), np.int64(-1)
     found, times = np.int64(-1), 0
     for i in range(count):
-        size, first, at = text(data, at, end, origin, big)
+        size, first, at = text(data, at, end, origin)
         if at < 0:
             return np.int64(0), np.int64(-1), np.int64(-1)
         if size == wanted.shape[0]:
@@ -152,24 +144,24 @@ def ends(at, end):
 
 
 @kernel
-def value(data, count, first, index, big):
+def value(data, count, first, index):
     """Number of a sequence, NaN where the sequence is empty."""
-    return float64(data, first + 8 * index, big) if count else math.nan
+    return float64(data, first + 8 * index) if count else math.nan
 
 
 @kernel
-def joint_state(data, begin, end, big, crank):
+def joint_state(data, begin, end, crank):
     """Read sensor_msgs/JointState: fault, stamp [ns], the crank's position, velocity and effort.
 
     A driver gives NaN for a velocity or an effort that it does not measure. The value is then absent; this is
     not a fault.
     """
     origin = begin + ENCAPSULATION
-    stamp, at = header(data, origin, end, big)
-    count, index, at = names(data, at, end, origin, big, crank)
-    n_q, q, at = numbers(data, at, end, origin, big)
-    n_v, v, at = numbers(data, at, end, origin, big)
-    n_e, e, at = numbers(data, at, end, origin, big)
+    stamp, at = header(data, origin, end)
+    count, index, at = names(data, at, end, origin, crank)
+    n_q, q, at = numbers(data, at, end, origin)
+    n_v, v, at = numbers(data, at, end, origin)
+    n_e, e, at = numbers(data, at, end, origin)
     if not ends(at, end):
         return UNDECODABLE, np.int64(0), math.nan, math.nan, math.nan
     if count == 0 or n_q == 0:
@@ -178,90 +170,90 @@ def joint_state(data, begin, end, big, crank):
         return WRONG_LENGTH, stamp, math.nan, math.nan, math.nan
     if index < 0:
         return MISSING_JOINT, stamp, math.nan, math.nan, math.nan
-    position = value(data, n_q, q, index, big)
-    velocity, effort = value(data, n_v, v, index, big), value(data, n_e, e, index, big)
+    position = value(data, n_q, q, index)
+    velocity, effort = value(data, n_v, v, index), value(data, n_e, e, index)
     finite = math.isfinite(position) and not math.isinf(velocity) and not math.isinf(effort)
     return NO_FAULT if finite else NOT_FINITE, stamp, position, velocity, effort
 
 
 @kernel
-def joint_angle(data, begin, end, big, wanted):
+def joint_angle(data, begin, end, wanted):
     """Position of a joint in a valid JointState: NaN if the joint is missing, infinite without an angle."""
     origin = begin + ENCAPSULATION
-    _, at = header(data, origin, end, big)
-    _, index, at = names(data, at, end, origin, big, wanted)
+    _, at = header(data, origin, end)
+    _, index, at = names(data, at, end, origin, wanted)
     if index < 0:
         return math.nan
-    count, first, _ = numbers(data, at, end, origin, big)
-    position = value(data, count, first, index, big)
+    count, first, _ = numbers(data, at, end, origin)
+    position = value(data, count, first, index)
     return position if math.isfinite(position) else math.inf
 
 
 @kernel
-def wrench_stamped(data, begin, end, big, axis):
+def wrench_stamped(data, begin, end, axis):
     """Read geometry_msgs/WrenchStamped: fault, stamp [ns], torque about an axis (0, 1, 2 for x, y, z)."""
     origin = begin + ENCAPSULATION
-    stamp, at = header(data, origin, end, big)
+    stamp, at = header(data, origin, end)
     if at >= 0:
         at = aligned(at, 8, origin)
     if at < 0 or at + 48 > end or not ends(at + 48, end):
         return UNDECODABLE, np.int64(0), math.nan
-    torque = float64(data, at + 24 + 8 * axis, big)
+    torque = float64(data, at + 24 + 8 * axis)
     return NO_FAULT if math.isfinite(torque) else NOT_FINITE, stamp, torque
 
 
 @kernel
-def float64_message(data, begin, end, big):
+def float64_message(data, begin, end):
     """Read std_msgs/Float64: fault and number."""
     at = begin + ENCAPSULATION
     if at + 8 > end or not ends(at + 8, end):
         return UNDECODABLE, math.nan
-    number = float64(data, at, big)
+    number = float64(data, at)
     return NO_FAULT if math.isfinite(number) else NOT_FINITE, number
 
 
 @kernel
-def wrench_force(data, begin, end, big, out_force):
+def wrench_force(data, begin, end, out_force):
     """Read the force of a geometry_msgs/WrenchStamped into (2,), x and y: fault, stamp [ns]."""
-    fault, stamp, _ = wrench_stamped(data, begin, end, big, 0)
+    fault, stamp, _ = wrench_stamped(data, begin, end, 0)
     if fault == UNDECODABLE:
         return fault, stamp
-    _, at = header(data, begin + ENCAPSULATION, end, big)
+    _, at = header(data, begin + ENCAPSULATION, end)
     at, finite = aligned(at, 8, begin + ENCAPSULATION), True
     for i in range(2):
-        out_force[i] = float64(data, at + 8 * i, big)
+        out_force[i] = float64(data, at + 8 * i)
         finite &= math.isfinite(out_force[i])
     return NO_FAULT if finite else NOT_FINITE, stamp
 
 
 @kernel
-def dynamic_joint_state(data, begin, end, big, joint, interface, further):
+def dynamic_joint_state(data, begin, end, joint, interface, further):
     """Read control_msgs/DynamicJointState: fault, stamp [ns], values of two interfaces of a joint.
 
     joint_state_broadcaster publishes NaN for an interface that has no value yet. The second value may be
     absent: it is then NaN, and this is not a fault.
     """
     origin = begin + ENCAPSULATION
-    stamp, at = header(data, origin, end, big)
-    count, index, at = names(data, at, end, origin, big, joint)
-    n_interfaces, at = counted(data, at, end, origin, big)
+    stamp, at = header(data, origin, end)
+    count, index, at = names(data, at, end, origin, joint)
+    n_interfaces, at = counted(data, at, end, origin)
     if at < 0 or n_interfaces > (end - at) // 8:
         return UNDECODABLE, np.int64(0), math.nan, math.nan
     is_there, is_short, number, beside = False, False, math.nan, math.nan
     for i in range(n_interfaces):
         own = at
-        n_names, found, at = names(data, at, end, origin, big, interface)
-        n_values, first, at = numbers(data, at, end, origin, big)
+        n_names, found, at = names(data, at, end, origin, interface)
+        n_values, first, at = numbers(data, at, end, origin)
         if at < 0:
             return UNDECODABLE, np.int64(0), math.nan, math.nan
         if i == index and found >= 0:
             is_there, is_short = True, n_values != n_names
             if not is_short:
-                number = float64(data, first + 8 * found, big)
+                number = float64(data, first + 8 * found)
                 if further.shape[0]:
-                    _, place, _ = names(data, own, end, origin, big, further)
+                    _, place, _ = names(data, own, end, origin, further)
                     if place >= 0:
-                        beside = float64(data, first + 8 * place, big)
+                        beside = float64(data, first + 8 * place)
     if not ends(at, end):
         return UNDECODABLE, np.int64(0), math.nan, math.nan
     if count == 0 or n_interfaces == 0:
@@ -321,26 +313,25 @@ def decode(
         position, velocity, torque, temperature = math.nan, math.nan, math.nan, math.nan
         force = out_force[i]
         force[0], force[1] = math.nan, math.nan
-        # XCDR1, big or little endian; parameter lists and XCDR2 lay out otherwise
-        if end - begin >= ENCAPSULATION and data[begin] == 0 and data[begin + 1] <= 1:
-            big = data[begin + 1] == 0
+        # parameter lists, XCDR2 and big endian lay out otherwise
+        if end - begin >= ENCAPSULATION and data[begin] == 0 and data[begin + 1] == 1:
             if kind == JOINT_STATE:
-                fault, stamp, position, velocity, torque = joint_state(data, begin, end, big, crank)
+                fault, stamp, position, velocity, torque = joint_state(data, begin, end, crank)
                 if not use_effort:
                     torque = math.nan
             elif kind == WRENCH_STAMPED:
-                fault, stamp, torque = wrench_stamped(data, begin, end, big, axis)
+                fault, stamp, torque = wrench_stamped(data, begin, end, axis)
             elif kind == FLOAT64:
-                fault, torque = float64_message(data, begin, end, big)
+                fault, torque = float64_message(data, begin, end)
                 stamp = messages[i]["log_time_ns"]
             elif kind == INTERFACES:
                 fault, stamp, torque, temperature = dynamic_joint_state(
-                    data, begin, end, big, crank, interface, thermal
+                    data, begin, end, crank, interface, thermal
                 )
             elif kind == LOAD_WRENCH:
-                fault, stamp = wrench_force(data, begin, end, big, force)
+                fault, stamp = wrench_force(data, begin, end, force)
             elif kind == LOAD_FLOAT64:
-                fault, force[1] = float64_message(data, begin, end, big)
+                fault, force[1] = float64_message(data, begin, end)
                 force[0], stamp = 0.0, messages[i]["log_time_ns"]
             elif kind == CONTACT_SWITCH:
                 fault, force[1] = bool_message(data, begin, end)
@@ -357,7 +348,7 @@ def decode(
             out_angles[i, j] = math.nan
             if kind == JOINT_STATE and fault == NO_FAULT:
                 wanted = encoders[first : ends_at[j]]
-                out_angles[i, j] = joint_angle(data, begin, end, data[begin + 1] == 0, wanted)
+                out_angles[i, j] = joint_angle(data, begin, end, wanted)
             first = ends_at[j]
 
 

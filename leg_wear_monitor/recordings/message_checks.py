@@ -18,13 +18,12 @@ class _Fields:
     """Reads the fields of a message one after the other, from the frame of its header on."""
 
     def __init__(self, raw: bytes) -> None:
-        self._raw, self._order = raw, "<" if raw[1] else ">"
-        self._at = ENCAPSULATION + 8
+        self._raw, self._at = raw, ENCAPSULATION + 8
         self.text()
 
     def count(self) -> int:
         self._at += -self._at % 4 + 4
-        return int(struct.unpack_from(f"{self._order}I", self._raw, self._at - 4)[0])
+        return int(struct.unpack_from("<I", self._raw, self._at - 4)[0])
 
     def text(self) -> str:
         size = self.count()
@@ -108,7 +107,7 @@ def _listed(names: list[str]) -> str:
 
 
 _AXES = "xyz"
-_TORQUE = (struct.Struct(">3d"), struct.Struct("<3d"))  # the end of a wrench, by the byte order's bit
+_TORQUE = struct.Struct("<3d")  # the end of a wrench
 _KEPT = 400
 _LEAST = 40
 _SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
@@ -133,7 +132,7 @@ class WrenchAxis:
     def add(self, wrenches: Iterable[bytes]) -> None:
         """Add sound messages of geometry_msgs/WrenchStamped."""
         for raw in wrenches:
-            self._torques.append(_TORQUE[raw[1] & 1].unpack_from(raw, len(raw) - _TORQUE[0].size))
+            self._torques.append(_TORQUE.unpack_from(raw, len(raw) - _TORQUE.size))
         del self._torques[:-_KEPT]
 
     def report(self) -> str:

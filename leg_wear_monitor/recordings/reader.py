@@ -24,7 +24,7 @@ from leg_wear_monitor.recordings.message_checks import (
     without_interface,
 )
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.twin import TORQUE
+from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
@@ -349,7 +349,7 @@ class Recording:
     @property
     def findings(self) -> list[Finding]:
         """Findings so far; complete after all blocks have been read."""
-        found = [each for source in self._sources for each in source.file.findings]
+        found = [each for source in self._sources for each in source.findings]
         return self._findings + found + self._pauses.findings
 
     @property
@@ -384,7 +384,6 @@ class Recording:
         none: NDArray[np.int64] = np.zeros(0, np.int64)
         waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
         for number, piece in self._pieces():
-            bag_file = self._sources[number].bag_file
             passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
@@ -392,7 +391,7 @@ class Recording:
             read += piece.stored
             times = piece.messages["log_time_ns"]
             source = np.full(len(times), number, np.int64)
-            new = Block(self._samples(bag_file, piece), times, min(read / total, 1.0), source)
+            new = Block(self._samples(self._sources[number], piece), times, min(read / total, 1.0), source)
             waiting = _merged(waiting, new)
         if len(waiting.samples):
             yield attrs.evolve(waiting, fraction=1.0)
@@ -407,11 +406,15 @@ class Recording:
             if piece is not None:
                 yield number, piece
 
-    def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
+    def _samples(self, source: bag.Source, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
-        if piece.samples is not None:  # a table has one clock only
-            return self._decoder.scaled(piece.samples)
-        samples = self._decoder.many(piece.data, piece.messages)
+        table = piece.samples
+        samples = self._decoder.many(piece.data, piece.messages) if table is None else table
+        cranks = (samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT)
+        source.steps.continued("stamp", samples["stamp_ns"][cranks])
+        source.steps.continued("log", piece.messages["log_time_ns"])
+        if table is not None:  # a table has one clock only
+            return self._decoder.scaled(table)
         self._joints.add_samples(piece, samples)
         wrenches = np.flatnonzero(
             (piece.messages["type"] == WRENCH_STAMPED)

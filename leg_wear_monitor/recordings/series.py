@@ -3,7 +3,7 @@
 `commissioning` then finds out which joint is the crank, and which torque drives it.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from typing import Any
 
@@ -93,11 +93,9 @@ _LONGEST_PAUSE_NS = 10 * 10**9
 _NO_JOINT = "(no joint)"  # name of a crank joint that no message has
 
 
-_Selected = list[tuple[str, Stream]]
-"""Topics that are read, and their streams; files of one recording may share an entry."""
-
-_Parts = list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
-"""Parts of one series, a piece each: stamps [ns], values, indices of the recording, (n,) each."""
+_Name = JointName | TorqueSource
+_Found = list[tuple[_Name, Samples, NDArray[np.float64]]]
+"""Name of a series, its samples, and their values of this series."""
 
 
 def read_signals(
@@ -133,52 +131,46 @@ def read_signals(
         If nothing can be read, or there is no topic of joints.
     """
     bag_files = find_files(paths)
+    collected: dict[_Name, list[Any]] = {}
     with ExitStack() as stack:
-        sources, unreadable = open_sources(bag_files, config, stack)
-        selected, skipped = _select(sources, joint_states, drive_torque)
-        if not any(stream.kind == CRANK for _, stream in selected):
-            raise RecordingError(
-                ", ".join(str(one.path) for one in bag_files),
-                "joint_states",
-                "no topic of sensor_msgs/msg/JointState",
-            )
-        collected: dict[JointName | TorqueSource, _Parts] = {}
+        sources, findings = open_sources(bag_files, config, stack)
+        streams = [_select(source, joint_states, drive_torque, findings) for source in sources]
+        if not any(stream.kind == CRANK for chosen in streams for stream in chosen.values()):
+            where = ", ".join(str(one.path) for one in bag_files)
+            raise RecordingError(where, "joint_states", "no topic of sensor_msgs/msg/JointState")
         read, total = 0, max(1, sum(source.file.size for source in sources))
-        for source in sources:
+        for source, chosen in zip(sources, streams, strict=True):
             for _, load in source.pieces():
                 piece = load()
                 if piece is not None:  # a damaged piece is a finding of its file
-                    recording = source.bag_file.recording
-                    _add_piece(collected, selected, piece, config, recording)
+                    for name, stamps, values in _piece_series(source, chosen, piece, config):
+                        recording = np.full(len(stamps), source.bag_file.recording)
+                        part = source.steps.continued(name, stamps), values, recording
+                        collected.setdefault(name, []).append(part)
                     read += piece.stored
                     progress(min(1.0, read / total))
-        findings = unreadable + skipped + [each for source in sources for each in source.file.findings]
+            findings += source.findings
     return _signals(collected), findings
 
 
 def _select(
-    sources: list[Source], joint_states: str | None, drive_torque: str | None
-) -> tuple[_Selected, list[Finding]]:
-    """Choose the topics to be read, and enter their channels in `Source.types`.
+    source: Source, joint_states: str | None, drive_torque: str | None, findings: list[Finding]
+) -> dict[int, Stream]:
+    """Streams of the channels to be read, by the numbers that the source then has as types of its messages.
 
-    A source writes the number that `Source.types` has for a channel into the field `type` of its messages.
-    Elsewhere this number is the code of the stream. Here several topics may have the same stream, so the
-    number is the position of topic and stream in the returned list, counted from 1.
+    Elsewhere such a number is the code of a stream. Here several topics may have the same stream.
     """
-    selected: dict[tuple[str, Stream], int] = {}
-    findings: list[Finding] = []
-    for source in sources:
-        for number, channel in sorted(source.file.channels.items()):
-            path, stream = source.bag_file.path, _stream(channel, joint_states, drive_torque)
-            if stream is None:
-                continue
-            try:
+    chosen = {}
+    for number, channel in source.file.channels.items():
+        path, stream = source.bag_file.path, _stream(channel, joint_states, drive_torque)
+        try:
+            if stream is not None:
                 check_channel(stream, channel, str(path))
-            except RecordingError as error:
-                findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
-                continue
-            source.types[number] = selected.setdefault((channel.topic, stream), 1 + len(selected))
-    return list(selected), findings
+                source.types[number] = 1 + number  # 0 is a message that is not read
+                chosen[1 + number] = stream
+        except RecordingError as error:
+            findings.append(Finding(path, f"{error.key} {error.fault}: it is not read", Severity.NOTE))
+    return chosen
 
 
 def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None) -> Stream | None:
@@ -193,29 +185,13 @@ def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None
     return None
 
 
-def _add_piece(
-    collected: dict[JointName | TorqueSource, _Parts],
-    selected: _Selected,
-    piece: Piece,
-    config: MonitorConfig,
-    recording: int,
-) -> None:
-    """Decode a piece, and add its values to the series of each joint and torque.
-
-    Parameters
-    ----------
-    collected : dict
-        Parts of the series so far, added to.
-    selected : list of (str, Stream)
-        List returned by `_select`; the field `type` of a message is the position in it, from 1.
-    piece : Piece
-    config : MonitorConfig
-        Names the columns of a table.
-    recording : int
-        Index of the recording.
-    """
+def _piece_series(
+    source: Source, streams: dict[int, Stream], piece: Piece, config: MonitorConfig
+) -> Iterator[tuple[_Name, NDArray[np.int64], NDArray[np.float64]]]:
+    """Stamps [ns] and values of each joint and torque in a piece."""
+    channels = source.file.channels
     for number in np.unique(piece.messages["type"]).tolist():
-        topic, stream = selected[number - 1]
+        topic, stream = channels[number - 1].topic, streams[number]
         is_chosen = piece.messages["type"] == number
         chosen = piece.messages[is_chosen]  # a copy, with the code that the decoder expects
         chosen["type"] = stream.code
@@ -229,12 +205,7 @@ def _add_piece(
             largest = KINDS[CRANK if isinstance(name, JointName) else TORQUE].largest
             is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(values) <= largest)
             stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
-            parts = collected.setdefault(name, [])
-            parts.append((stamps, values[is_usable], np.full(len(stamps), recording)))
-
-
-_Found = list[tuple[JointName | TorqueSource, Samples, NDArray[np.float64]]]
-"""Name of a series, its samples, and their values of this series."""
+            yield name, stamps, values[is_usable]
 
 
 def _table_series(topic: str, stream: Stream, samples: Samples, config: MonitorConfig) -> _Found:
@@ -319,22 +290,21 @@ def _first_decodable(source: str, data: NDArray[np.uint8], messages: NDArray[np.
     return [data[one["begin"] : one["end"]].tobytes() for one in messages[decodable]]
 
 
-def _signals(collected: dict[JointName | TorqueSource, _Parts]) -> Signals:
+def _signals(collected: dict[_Name, list[Any]]) -> Signals:
     """Join the parts of each series that is not empty; time 0 is the first stamp of all series.
 
     Longer pauses are shortened, and so is a clock that is set while recording: memory is for walking time.
     """
-    full: dict[JointName | TorqueSource, Any] = {}
-    for name, parts in collected.items():
-        if any(len(stamps) for stamps, _, _ in parts):
-            full[name] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    if not full:
-        return Signals({}, {})
-    all_ns = np.unique(np.concatenate([stamps for stamps, _, _ in full.values()]))
-    walked_ns = np.append(0, np.cumsum(np.minimum(np.diff(all_ns), _LONGEST_PAUSE_NS)))
+    full = {
+        name: [np.concatenate(column) for column in zip(*parts, strict=True)]
+        for name, parts in collected.items()
+    }
+    all_ns = np.unique(np.concatenate([stamps for stamps, _, _ in full.values()] or [np.zeros(0, np.int64)]))
+    walked_ns = np.cumsum(np.minimum(np.diff(all_ns, prepend=all_ns[:1]), _LONGEST_PAUSE_NS))
     found = {
         name: series(walked_ns[np.searchsorted(all_ns, stamps)], values, recording, 0)
         for name, (stamps, values, recording) in full.items()
+        if len(stamps)
     }
     joints = {name: one for name, one in found.items() if isinstance(name, JointName)}
     torques = {name: one for name, one in found.items() if isinstance(name, TorqueSource)}

@@ -288,6 +288,32 @@ def test_a_pause_inside_a_file_is_reported_and_left_out(tmp_path: Path, walk: Wa
     assert any("has no samples for 7 days" in text for text in texts), texts
 
 
+def test_a_clock_that_is_set_back_is_reported_alike_in_a_bag_and_in_a_table(
+    tmp_path: Path, walk: Walk
+) -> None:
+    """Two parts of the walk have the same times: they are not mixed, in replay and in commissioning."""
+    half_ns, step_ns = int(np.median(walk.crank_ns)), 3 * 10**9
+
+    def earlier(topic: str, data: bytes) -> bytes:
+        second = int.from_bytes(data[4:8], "little")
+        is_late = 10**9 * second + int.from_bytes(data[8:12], "little") > half_ns
+        return data[:4] + (second - is_late * step_ns // 10**9).to_bytes(4, "little") + data[8:]
+
+    torque = np.interp(walk.crank_ns, walk.torque_ns, walk.torque)
+    stamps = walk.crank_ns - (walk.crank_ns > half_ns) * step_ns
+    table = {"time": 1.0e-9 * stamps, "crank_angle": walk.angle, "drive_torque": torque}
+    texts = []
+    for recording in (rewritten(tmp_path / "back.mcap", earlier), table):
+        result = lw.replay(recording, BAG.with_suffix(".yaml"))
+        (finding,) = (one.text for one in result.summary().recording.findings)
+        assert "has stamps that go back by 2.99 s after 2026-" in finding
+        assert result.summary().cycles >= 8
+        proposed = lw.commission(recording, config=BAG.with_suffix(".yaml"))
+        assert finding in [one.text for one in proposed.faults]
+        texts.append(finding)
+    assert texts[0] == texts[1]
+
+
 SIGNALS = {
     "zero": lambda angle: 0.0 * angle,
     "constant": lambda angle: 0.0 * angle + 3.7,

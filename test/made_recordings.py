@@ -56,7 +56,7 @@ def foreign():
     schema = pytest.importorskip("mcap.records").Schema
 
     def read(name, raw):
-        text = definition(name).text
+        text = definition(name)
         return decoder.decoder_for("cdr", schema(CODES[name], text.encode(), "ros2msg", name))(raw)
 
     return read
@@ -115,7 +115,7 @@ def write_bag():
             for each in sent:
                 if each.topic not in channels:
                     known = definitions and each.type in CODES
-                    text = definition(each.type).text.encode() if known else b""
+                    text = definition(each.type).encode() if known else b""
                     schema = writer.register_schema(each.type, "ros2msg", text)
                     channels[each.topic] = writer.register_channel(each.topic, "cdr", schema)
                 writer.add_message(channels[each.topic], each.log_time_ns, each.raw, each.log_time_ns - 5)

@@ -35,7 +35,7 @@ from leg_wear_monitor.recordings.findings import (
     RecordingError,
     check_size,
 )
-from leg_wear_monitor.recordings.streams import RELIABLE, Qos, definition
+from leg_wear_monitor.recordings.streams import RELIABLE, Qos, definition, types
 
 MAGIC = b"\x89MCAP0\r\n"
 _UNREADABLE = (
@@ -354,11 +354,11 @@ class McapWriter:
         qos : Qos
             Quality of service offered by the publisher.
         """
-        known = definition(type_name)
         if type_name not in self._schemas:
-            text = known.text.encode()
+            text = definition(type_name).encode()
             self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", text)
-        metadata = {"offered_qos_profiles": qos.text(), "topic_type_hash": known.digest}
+        digest = types().hash_rihs01(type_name)
+        metadata = {"offered_qos_profiles": qos.text(), "topic_type_hash": digest}
         return self._writer.register_channel(topic, "cdr", self._schemas[type_name], metadata)
 
     def write(self, channel: int, log_time_ns: int, raw: bytes) -> None:

@@ -2,8 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 import numpy as np
@@ -28,58 +27,9 @@ from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.verdict import with_unit
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS
-from leg_wear_monitor.recordings.streams import LATCHED, SENSOR_DATA, Outgoing, Output, single
+from leg_wear_monitor.recordings.streams import LATCHED, SENSOR_DATA, ForecastTimes, Outgoing, Output, single
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
-
-# Values of each clearance joint as numbers of their own, because tools plot arrays by index only.
-
-
-def _remaining_p50_h(joint: JointReport) -> float | None:
-    hours = joint.forecast.hours if joint.forecast else None
-    return hours.p50 if hours else None
-
-
-SCALARS: Mapping[str, Callable[[JointReport], float | None]] = MappingProxyType(
-    {
-        "clearance_m": lambda joint: joint.clearance_m,
-        "estimated_m": lambda joint: joint.estimated_m,
-        "remaining_p50_h": _remaining_p50_h,
-        "peak_force_n": lambda joint: joint.peak_force_n,
-    }
-)
-"""Values of a joint by the last part of their topics' names; None or not finite if not known."""
-
-
-class Scalars:
-    """Messages of std_msgs/Float64 after each gait cycle; a value that is not known has no message.
-
-    Parameters
-    ----------
-    clearance_joints : sequence of str
-        The clearance joints, in the order of the reports.
-
-    Attributes
-    ----------
-    outputs : tuple of Output
-        One for each joint and value, such as ``~/joints/A/clearance_m``.
-    """
-
-    def __init__(self, clearance_joints: Sequence[str]) -> None:
-        self._by_joint = {
-            joint: {name: Output(f"~/joints/{joint}/{name}", encode.FLOAT64) for name in SCALARS}
-            for joint in clearance_joints
-        }
-        self.outputs = tuple(output for outputs in self._by_joint.values() for output in outputs.values())
-
-    def of(self, cycle: CycleReport) -> Iterator[Outgoing]:
-        """Messages of all known values of a gait cycle."""
-        for joint in cycle.joints:
-            for name, output in self._by_joint[joint.joint].items():
-                value = SCALARS[name](joint)
-                if value is not None and math.isfinite(value):
-                    yield single(output, cycle.stamp_ns, encode.float64s(value)[0].tobytes())
-
 
 CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
 IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
@@ -93,7 +43,9 @@ DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
 OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
 """Outputs of every monitor; `Messages.outputs` has all."""
 
-_AXES = {"x": 0, "y": 1, "z": 2}
+SCALARS = ("clearance_m", "estimated_m", "remaining_p50_h", "peak_force_n")
+"""Values of each clearance joint as numbers of their own, because tools plot arrays by index only."""
+
 _DIGITS = 15
 
 
@@ -116,27 +68,31 @@ class Messages:
 
     def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
         self.config, self._node = config, node.lstrip("/")
-        self._scalars = Scalars(clearance_joints) if config.publish_scalars else None
-        plotted = () if self._scalars is None else (MEASURED_TORQUE, *self._scalars.outputs)
-        self.outputs = (*OUTPUTS, *plotted)
+        named = [(joint, name) for joint in clearance_joints for name in SCALARS]
+        self._scalars = {
+            each: Output(f"~/joints/{'/'.join(each)}", encode.FLOAT64)
+            for each in (named if config.publish_scalars else ())
+        }
+        self.outputs = (*OUTPUTS, *((MEASURED_TORQUE, *self._scalars.values()) if self._scalars else ()))
+        self._forecasts = ForecastTimes()
         self._clearances = [f"{joint}_clearance" for joint in clearance_joints]
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages for reports: samples, gait cycles, alarms, verdict and state."""
-        yield from self.of_samples(reports.samples)
+        """All messages for reports but forecasts: samples, gait cycles, alarms, verdict and state."""
+        yield from self._of_samples(reports.samples)
         for cycle in reports.cycles:
-            yield single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
-            if self._scalars:
-                yield from self._scalars.of(cycle)
-        for alarms in reports.alarms:
-            yield single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
-        for verdict in reports.verdicts:
-            yield single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
-        for state in reports.states:
-            yield single(STATE, state.stamp_ns, self.state(state))
+            yield self._clearance_states(cycle)
+            yield from self._joint_values(cycle)
+        yield from map(self.alarms, reports.alarms)
+        yield from map(self.verdict, reports.verdicts)
+        yield from map(self.state, reports.states)
 
-    def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
+    def forecasts(self, reports: Reports) -> Iterator[Outgoing]:
+        """Forecasts after the gait cycles after which one is due."""
+        return map(self.forecast, self._forecasts.due(reports))
+
+    def _of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
         """Torque at each tracked sample, contact forces at each crank sample, and the measured torque."""
         followed = np.isfinite(samples.predicted_torque_nm)
         if followed.any():
@@ -151,7 +107,7 @@ class Messages:
 
     def _torques(self, output: Output, stamps: NDArray[np.int64], torques: Floats) -> Outgoing:
         torque = np.zeros((len(stamps), 3))
-        torque[:, _AXES[self.config.drive_torque.axis]] = torques
+        torque[:, "xyz".index(self.config.drive_torque.axis)] = torques
         return Outgoing(output, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
 
     def _forces(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
@@ -159,56 +115,58 @@ class Messages:
         rows = encode.joint_states(stamps, self._impacts, effort=forces, frame_id=self.config.frame_id)
         return Outgoing(IMPACTS, stamps, rows)
 
-    def clearances(self, cycle: CycleReport) -> bytes:
-        """The message of `CLEARANCES` for a gait cycle."""
+    def _clearance_states(self, cycle: CycleReport) -> Outgoing:
         joints = cycle.joints
-        growth = [or_nan(joint.growth_mps) for joint in joints]
-        return encode.joint_states(
+        rows = encode.joint_states(
             [cycle.stamp_ns],
             self._clearances,
             position=[[joint.clearance_m for joint in joints]],
-            velocity=[growth],
+            velocity=[[or_nan(joint.growth_mps) for joint in joints]],
             effort=[[joint.peak_force_n for joint in joints]],
             frame_id=self.config.frame_id,
-        ).tobytes()
+        )
+        return single(CLEARANCES, cycle.stamp_ns, rows.tobytes())
 
-    def forecast(self, cycle: CycleReport) -> bytes:
-        """The message of `FORECAST` after a gait cycle: remaining life of each joint and of the leg."""
+    def _joint_values(self, cycle: CycleReport) -> Iterator[Outgoing]:
+        """Values of `SCALARS`; a value that is not known has no message."""
+        for joint in cycle.joints if self._scalars else ():
+            hours = joint.forecast.hours if joint.forecast else None
+            values = (joint.clearance_m, joint.estimated_m, hours.p50 if hours else None, joint.peak_force_n)
+            for name, value in zip(SCALARS, values, strict=True):
+                if value is not None and math.isfinite(value):
+                    raw = encode.float64s(value)[0].tobytes()
+                    yield single(self._scalars[joint.joint, name], cycle.stamp_ns, raw)
+
+    def forecast(self, cycle: CycleReport) -> Outgoing:
+        """Remaining life of each joint and of the leg after a gait cycle."""
         leg = [] if cycle.forecast is None else [_leg_lifetime(cycle.forecast)]
-        return self._array(cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
+        return self._array(FORECAST, cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
 
-    def alarms(self, alarms: AlarmList) -> bytes:
-        """The message of `ALARMS`: the present state of all alarms."""
-        return self._array(alarms.stamp_ns, map(_alarm, alarms.alarms))
+    def alarms(self, alarms: AlarmList) -> Outgoing:
+        """The present state of all alarms."""
+        return self._array(ALARMS, alarms.stamp_ns, map(_alarm, alarms.alarms))
 
-    def verdict(self, report: VerdictReport) -> bytes:
-        """The message of `VERDICT`: one status, as the first one of `DIAGNOSTICS`."""
-        return self._array(report.stamp_ns, [verdict_status(report.verdict)])
+    def verdict(self, report: VerdictReport) -> Outgoing:
+        """One status, as the first one of `DIAGNOSTICS`."""
+        return self._array(VERDICT, report.stamp_ns, [verdict_status(report.verdict)])
 
-    def state(self, report: VerdictReport) -> bytes:
-        """The message of `STATE`: JSON of the state of the leg, in one line."""
-        return encode.string(json.dumps(report.state.to_dict(), allow_nan=False))
+    def state(self, report: VerdictReport) -> Outgoing:
+        """JSON of the state of the leg, in one line."""
+        text = json.dumps(report.state.to_dict(), allow_nan=False)
+        return single(STATE, report.stamp_ns, encode.string(text))
 
-    def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
-        """The message of `DIAGNOSTICS`."""
-        return self._array(stamp_ns, statuses)
+    def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> Outgoing:
+        """Statuses of the monitor."""
+        return self._array(DIAGNOSTICS, stamp_ns, statuses)
 
-    def _array(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
-        hardware = self.config.hardware
-        lines = [
-            (
-                f"{self._node}: {status.name}",
-                int(status.level),
-                status.message,
-                hardware,
-                {
-                    "fault_code": status.fault_code,
-                    **{key: plain(value) for key, value in status.values.items()},
-                },
-            )
-            for status in statuses
-        ]
-        return encode.diagnostic_array(stamp_ns, lines)
+    def _array(self, output: Output, stamp_ns: int, statuses: Iterable[Status]) -> Outgoing:
+        lines = []
+        for status in statuses:
+            values = {key: plain(value) for key, value in status.values.items()}
+            values = {"fault_code": status.fault_code, **values}
+            name = f"{self._node}: {status.name}"
+            lines.append((name, int(status.level), status.message, self.config.hardware, values))
+        return single(output, stamp_ns, encode.diagnostic_array(stamp_ns, lines))
 
 
 def plain(value: float) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from itertools import chain
 from pathlib import Path
 
 import attrs
@@ -15,14 +16,14 @@ from leg_wear_monitor.monitor.config.parameters import NODE, load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.ledger.file import copy_of
-from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports
+from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, AlarmList, Reports, VerdictReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
 from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.recordings.leg_markers import LegDrawing, LegMarkers
-from leg_wear_monitor.recordings.outputs import ALARMS, DIAGNOSTICS, FORECAST, STATE, VERDICT, Messages
+from leg_wear_monitor.recordings.outputs import Messages
 from leg_wear_monitor.recordings.reader import Block, Recording
-from leg_wear_monitor.recordings.streams import ForecastTimes, topic_of
+from leg_wear_monitor.recordings.streams import Outgoing, topic_of
 from leg_wear_monitor.recordings.summary import History, ReplayResult
 from leg_wear_monitor.state import LegState
 from leg_wear_monitor.twin.sample import Samples
@@ -281,8 +282,7 @@ class Sink:
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)
             for output in self._messages.outputs
         }
-        self._start, self._has_begun = (monitor.alarms, monitor.state_report), False
-        self._forecasts = ForecastTimes()
+        self._start: tuple[AlarmList, VerdictReport] | None = (monitor.alarms, monitor.state_report)
         self._markers = (
             LegMarkers(monitor, LegDrawing(monitor.mechanism)) if monitor.config.publish_markers else None
         )
@@ -304,19 +304,17 @@ class Sink:
         stamp_ns : int
             Stamp of the status [ns]; 0 if no time is known yet.
         """
-        if stamp_ns > 0 and not self._has_begun:
-            self._has_begun = True  # like the node, begin with all alarms, the verdict and the state
+        messages = self._messages
+        if stamp_ns > 0 and self._start:  # like the node, begin with all alarms, the verdict and the state
             alarms, report = self._start
-            self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(alarms))
-            self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(report))
-            self._writer.write(self._channels[STATE], stamp_ns, self._messages.state(report))
-        for outgoing in self._messages.of(reports):
-            self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
-        for outgoing in self._markers.of(reports) if self._markers else ():
-            self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
-        for cycle in self._forecasts.due(reports):
-            raw = self._messages.forecast(cycle)
-            self._writer.write(self._channels[FORECAST], cycle.stamp_ns, raw)
+            for one in (messages.alarms(alarms), messages.verdict(report), messages.state(report)):
+                self._write(attrs.evolve(one, stamp_ns=np.array([stamp_ns])))
+            self._start = None
+        markers = self._markers.of(reports) if self._markers else ()
+        for outgoing in chain(messages.of(reports), markers, messages.forecasts(reports)):
+            self._write(outgoing)
         if stamp_ns > 0:
-            raw = self._messages.diagnostics(stamp_ns, self._monitor.status())
-            self._writer.write(self._channels[DIAGNOSTICS], stamp_ns, raw)
+            self._write(messages.diagnostics(stamp_ns, self._monitor.status()))
+
+    def _write(self, outgoing: Outgoing) -> None:
+        self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)

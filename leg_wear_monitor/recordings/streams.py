@@ -156,23 +156,7 @@ def topic_of(output: Output, node: str) -> str:
     return node + output.name[1:] if output.name.startswith("~") else output.name
 
 
-# Message definitions and type hashes, which a recording needs so that other tools can read it.
-
-
-@attrs.frozen
-class Definition:
-    """A message type.
-
-    Attributes
-    ----------
-    text : str
-        Definition in ros2msg format, including the definitions of all nested types.
-    digest : str
-        Type hash of REP-2011, ``RIHS01_...``.
-    """
-
-    text: str
-    digest: str
+# Message definitions, which a recording needs so that other tools can read it.
 
 
 # This type belongs to ros2_control and is not among ROS 2's common interfaces.
@@ -196,11 +180,9 @@ def types() -> "Typestore":
     return store
 
 
-@cache
-def definition(name: str) -> Definition:
-    """Definition of a message type of ROS 2's common interfaces or of ros2_control."""
-    text, _ = types().generate_msgdef(name, ros_version=2)
-    return Definition(text, types().hash_rihs01(name))
+def definition(name: str) -> str:
+    """Definition of a message type of ROS 2's common interfaces or of ros2_control, with all nested types."""
+    return types().generate_msgdef(name, ros_version=2)[0]
 
 
 # Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.

@@ -6,7 +6,7 @@ A forecast that the verdict rejects has no remaining life.
 from array import array
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -45,34 +45,18 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL
 # Replay results per gait cycle, stored as compact columns so that days of walking fit into memory.
 
 
-JOINT_COLUMNS = (
-    "clearance_m",
-    "clearance_max_m",
-    "growth_m_per_cycle",
-    "peak_force_n",
-    "p99_force_n",
-    "mean_force_n",
-    "impacts",
-)
 SEEN_COLUMNS = ("estimated_m", "estimated_sigma_m")
 """More certain of the two estimates of a joint's clearance: from encoders or from the drive torque."""
 
-_OF_A_JOINT = (*JOINT_COLUMNS, *SEEN_COLUMNS)
+_FIELDS = attrs.fields(ReplayHistory)
+CYCLE_COLUMNS = tuple(field.name for field in _FIELDS if field.type == Floats)
+SUMMARY_COLUMNS = {
+    field.name.replace("modelled_", "clearance_"): field.name
+    for field in _FIELDS
+    if field.type == dict[str, Floats] and field.name not in ("lowest", "highest")
+}
+"""Columns of a joint in a summary, by their names in a report, whose clearance is the modelled one."""
 
-SUMMARY_COLUMNS = {name: name.replace("clearance_", "modelled_") for name in _OF_A_JOINT}
-"""Names of the columns of a joint in a summary, whose one clearance of a joint is the believed one."""
-
-CYCLE_COLUMNS = (
-    "cycle",
-    "cadence_rpm",
-    "moving_s",
-    "bridged_s",
-    "measured_torque_rms_nm",
-    "predicted_torque_rms_nm",
-    "torque_mismatch",
-    "load_n",
-    "friction_nm",
-)
 _MOST_CHANGES = 10_000
 
 
@@ -113,7 +97,7 @@ class History:
         self._stamps.append(report.stamp_ns)
         self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
         for joint in report.joints:
-            self._joints.extend(or_nan(getattr(joint, name)) for name in _OF_A_JOINT)
+            self._joints.extend(or_nan(getattr(joint, name)) for name in SUMMARY_COLUMNS)
 
     def add_alarms(self, alarms: AlarmList) -> None:
         """Add the alarms of a list that have changed."""
@@ -136,26 +120,23 @@ class History:
         return table[:, CYCLE_COLUMNS.index(name)]
 
     def joint_column(self, name: str) -> Floats:
-        """One of `JOINT_COLUMNS` or `SEEN_COLUMNS`, shape (cycles, clearance joints); NaN where unknown."""
-        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(_OF_A_JOINT))
-        return table[:, :, _OF_A_JOINT.index(name)]
+        """One of `SUMMARY_COLUMNS`, shape (cycles, clearance joints); NaN where unknown."""
+        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(SUMMARY_COLUMNS))
+        return table[:, :, list(SUMMARY_COLUMNS).index(name)]
 
+
+_Forecast = TypeVar("_Forecast", JointForecast, LegForecast)
 
 # Condition of the leg at the end of a replay. A forecast that the verdict rejects has no remaining life.
 
 
-def joint_forecast(forecast: JointForecast | None, verdict: Verdict) -> JointForecast | None:
-    """A joint's forecast; without life and clearance if the verdict marks them as not valid."""
+def _valid(forecast: _Forecast | None, verdict: Verdict) -> _Forecast | None:
+    """A forecast; without life and clearance if the verdict marks them as not valid."""
     if forecast is None or Figure.FORECAST not in verdict.not_valid:
         return forecast
-    return attrs.evolve(forecast, cycles=None, hours=None, days=None, clearance_m=None)
-
-
-def leg_forecast(forecast: LegForecast | None, verdict: Verdict) -> LegForecast | None:
-    """The leg's forecast; without its remaining life if the verdict marks it as not valid."""
-    if forecast is None or Figure.FORECAST not in verdict.not_valid:
-        return forecast
-    return attrs.evolve(forecast, cycles=None, hours=None, days=None, first_probability={}, first=None)
+    is_joint = isinstance(forecast, JointForecast)
+    unknown: dict[str, Any] = {"clearance_m": None} if is_joint else {"first_probability": {}, "first": None}
+    return attrs.evolve(forecast, cycles=None, hours=None, days=None, **unknown)
 
 
 # The summary of a replay, the source of its files and its page.
@@ -256,7 +237,7 @@ class ReplayResult:
         is_known = self.is_believable and last is not None
         verdict, known = state.verdict, attrs.asdict(state, recurse=False)
         known["alarms"] = attrs.evolve(state.alarms, changes=_changes(self))
-        forecast = leg_forecast(last.forecast, verdict) if is_known and last else None
+        forecast = _valid(last.forecast, verdict) if is_known and last else None
         return ReplaySummary(
             **(known if is_known else known | {"clearances": {}, "life": {}}),
             recording=_recording(self),
@@ -360,7 +341,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         ReplayJoint,
         joint,
         opened_m=float(clearance[-1] - clearance[0]),
-        forecast=joint_forecast(joint.forecast, verdict),
+        forecast=_valid(joint.forecast, verdict),
         peak_force_n=_of_known(np.max, peak),
         mean_force_n=_of_known(np.mean, mean),
         encoders=with_same_fields(EncoderEvidence, joint.seen) if joint.seen else None,

@@ -29,7 +29,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.outputs import Messages
-from leg_wear_monitor.recordings.streams import SENSOR_DATA, STREAMS, ForecastTimes
+from leg_wear_monitor.recordings.streams import SENSOR_DATA, STREAMS
 from leg_wear_monitor.ros.health import Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage
@@ -244,7 +244,6 @@ class MonitorNode(ClosingNode):
             config.record.path, config.record.stop_recording_dir, config.hardware, report
         )
         self._outlets = Outlets(self, self._messages.outputs, self._black_box)
-        self._forecasts = ForecastTimes()
         self._compile(decoder)
         mechanism = self._monitor.mechanism
         parameters.follow(
@@ -366,21 +365,21 @@ class MonitorNode(ClosingNode):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
                 self._load.unpublished += len(outgoing.stamp_ns)
             elif self._outlets.wanted(outgoing.output):
-                self._outlets.send_many(outgoing.output, now_ns, outgoing.messages)
+                self._outlets.send(outgoing, now_ns)
         for verdict in reports.verdicts:
             was_stop, self._is_stop = self._is_stop, verdict.verdict.state is State.STOP
             if self._is_stop and not was_stop:
                 self._black_box.stop(now_ns)
-        for cycle in self._forecasts.due(reports):
-            self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
+        for forecast in self._messages.forecasts(reports):
+            self._outlets.send(forecast, now_ns)
 
     def _send_state(self) -> None:
         """Publish the present alarms, verdict and state of the leg."""
         alarms = self._supervision.alarms(self._monitor.alarms)
         report = self._supervision.state(self._monitor.state_report)
-        self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
-        self._outlets.send(outputs.VERDICT, time.time_ns(), self._messages.verdict(report))
-        self._outlets.send(outputs.STATE, time.time_ns(), self._messages.state(report))
+        messages = self._messages
+        for outgoing in (messages.alarms(alarms), messages.verdict(report), messages.state(report)):
+            self._outlets.send(outgoing, time.time_ns())
 
     def _diagnose(self) -> None:
         now_ns, turn_ns = time.time_ns(), self._turn()
@@ -394,7 +393,7 @@ class MonitorNode(ClosingNode):
             self._epochs.status(),
         )
         message = self._messages.diagnostics(self._ros_now_ns(), self._supervision.statuses(status))
-        self._outlets.send(outputs.DIAGNOSTICS, now_ns, message)
+        self._outlets.send(message, now_ns)
         self._black_box.flush()
 
     # --- operators ---
@@ -446,7 +445,7 @@ class MonitorNode(ClosingNode):
         """Publish an operator's changes, because a leg at rest has no gait cycle that would publish them."""
         self._send_state()
         if last := self._monitor.last_cycle:
-            self._outlets.send(outputs.FORECAST, time.time_ns(), self._messages.forecast(last))
+            self._outlets.send(self._messages.forecast(last), time.time_ns())
 
     def _reset_wear(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())

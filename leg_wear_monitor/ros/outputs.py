@@ -312,14 +312,9 @@ class Outlets:
             return self._publishers[output].get_subscription_count() > 0
         return False
 
-    def send(self, output: Output, now_ns: int, raw: bytes) -> None:
-        """Record and publish a message; only record it after the context has shut down."""
-        self._black_box.write(self._topics[output], now_ns, raw)
-        with until_down(self._context):
-            self._publishers[output].publish(raw)
-
-    def send_many(self, output: Output, now_ns: int, rows: NDArray[np.uint8]) -> None:
-        """Record and publish messages of equal length, (n, bytes)."""
+    def send(self, outgoing: Outgoing, now_ns: int) -> None:
+        """Record and publish messages; only record them after the context has shut down."""
+        output, rows = outgoing.output, outgoing.messages
         self._black_box.write(self._topics[output], now_ns, rows)
         size, whole, handle = rows.shape[1], rows.tobytes(), self._publishers[output].handle
         with until_down(self._context), handle:  # like `publish`, which checks the type of each message
@@ -384,4 +379,4 @@ class MarkerTopic:
             self._send(self._drawn.no_data(self._node.get_clock().now().nanoseconds))
 
     def _send(self, outgoing: Outgoing) -> None:
-        self._outlets.send_many(outgoing.output, time.time_ns(), outgoing.messages)
+        self._outlets.send(outgoing, time.time_ns())

@@ -165,28 +165,27 @@ class Table:
             index: Any = getattr(frame, "index", None)  # pandas has one
             if getattr(index, "name", None) is not None:
                 content.setdefault(str(index.name), index)
-        self.head = Head([str(name) for name in content])
-        self._content = list(content.values())
-        self.size = len(self._content[0]) if self._content else 0
+        self._content = {str(name): column for name, column in content.items()}
+        self.head = Head(list(self._content))
+        self.size = self._rows = next(map(len, self._content.values()), 0)
 
     def batches(self, columns: Sequence[int]) -> Iterator[Batch]:
         """Rows of the columns with these indices."""
-        arrays = [self._array(self.head.names[k], self._content[k]) for k in columns]
-        if len({len(array) for array in arrays}) > 1:
-            words = ", ".join(f"{self.head.names[k]} {len(self._content[k])}" for k in columns)
-            raise RecordingError(str(self.path), "", f"has columns of different lengths: {words}")
-        for begin in range(0, len(arrays[0]), _ROWS):
-            chosen = [array[begin : begin + _ROWS] for array in arrays]
-            yield begin + 1 + np.arange(len(chosen[0])), chosen, len(chosen[0])
-
-    def _array(self, name: str, values: Any) -> Any:
-        if len(shape := np.shape(values)) != 1:
-            fault = f"column {name!r} has the shape {shape}. Expected one number a row"
-            raise RecordingError(str(self.path), "", fault)
+        names, at = [self.head.names[k] for k in columns], 0
         try:
-            return pa.array(values, from_pandas=True)
+            for batch in self._read(names):
+                stored = self.size * batch.num_rows // max(1, self._rows)
+                yield at + 1 + np.arange(batch.num_rows), [batch.column(name) for name in names], stored
+                at += batch.num_rows
+        except (pa.ArrowException, OSError) as error:
+            self.lose(f"all from row {at + 1} on is lost: {one_line(error)}")
+
+    def _read(self, names: list[str]) -> Iterator[Any]:
+        try:
+            arrays = [pa.array(self._content[name], from_pandas=True) for name in names]
+            return iter(pa.Table.from_arrays(arrays, names).to_batches(_ROWS))
         except (pa.ArrowException, TypeError) as error:
-            fault = f"column {name!r} has neither numbers nor dates: {one_line(error)}"
+            fault = f"has a column without numbers or dates, or of a different length: {one_line(error)}"
             raise RecordingError(str(self.path), "", fault) from error
 
     def lose(self, text: str) -> None:
@@ -292,18 +291,10 @@ class ParquetTable(Table):
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             fault = f"is not a readable Parquet file: {one_line(error)}"
             raise RecordingError(str(self.path), "", fault) from error
+        self._rows = self._file.metadata.num_rows
 
-    def batches(self, columns: Sequence[int]) -> Iterator[Batch]:
-        """Rows of some columns."""
-        names, at = [self.head.names[k] for k in columns], 0
-        try:
-            for batch in self._file.iter_batches(_ROWS, columns=names):
-                stored = self.size * batch.num_rows // max(1, self._file.metadata.num_rows)
-                read = [batch.column(name) for name in names]
-                yield at + 1 + np.arange(batch.num_rows), read, stored
-                at += batch.num_rows
-        except (pa.ArrowException, OSError) as error:
-            self.lose(f"all from row {at + 1} on is lost: {one_line(error)}")
+    def _read(self, names: list[str]) -> Iterator[Any]:
+        return iter(self._file.iter_batches(_ROWS, columns=names))
 
 
 def open_table(path: Path, content: IO[bytes] | Any, storage: str, wanted: str) -> Table:

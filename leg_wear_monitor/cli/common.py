@@ -104,28 +104,11 @@ limit_option: Option = option(
 config_option: Option = path_option(
     "--config", "FILE", "Parameter file of the node.  [default: config/monitor.yaml of the package]"
 )
-ledger_option: Option = file_option(
-    "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
-)
-node_option: Option = option(
-    "--node",
-    "NAME",
-    "Full name of a running monitor, such as /left/leg_wear_monitor. With --config: of the node whose "
-    "parameters and ledger are used.",
-)
 section_option: Option = option(
     "--node",
     "NAME",
     "Full name of the node whose parameters are read, such as /left/leg_wear_monitor.  "
     "[default: the only one in the file]",
-)
-wait_option: Option = option(
-    "--wait",
-    "S",
-    "With --node: longest wait [s] for the monitor, and then for its answer.",
-    "wait_s",
-    type=POSITIVE,
-    default=10.0,
 )
 workers_option: Option = option(
     "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
@@ -176,13 +159,6 @@ def need_rclpy() -> None:
         raise LegWearError(
             f"rclpy: {error}; source a ROS 2 installation, or pip install 'leg_wear_monitor[ros]'"
         ) from error
-
-
-def check_alone(**others: object) -> None:
-    """Refuse options together with ``--node``: a running monitor has its own parameters and ledger."""
-    if any(others.values()):
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
-        raise click.UsageError(f"--node cannot be combined with {names}")
 
 
 def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:

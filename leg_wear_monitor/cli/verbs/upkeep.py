@@ -1,12 +1,13 @@
 """Verbs of upkeep: ``acknowledge``, ``reset``, ``measure``."""
 
+import functools
 import getpass
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import click
@@ -18,9 +19,47 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 
+# Where an operator's entry goes: into a ledger, or to a running monitor, which has its own parameters.
+
+_TARGET = (
+    common.config_option,
+    common.file_option(
+        "--ledger", "FILE", "Ledger to write into.  [default: the one in the parameters]", exists=True
+    ),
+    common.option(
+        "--node",
+        "NAME",
+        "Full name of a running monitor, such as /left/leg_wear_monitor. With --config: of the node whose "
+        "parameters and ledger are used.",
+    ),
+    common.option(
+        "--wait",
+        "S",
+        "With --node: longest wait [s] for the monitor, and then for its answer.",
+        "wait_s",
+        type=common.POSITIVE,
+        default=10.0,
+    ),
+)
+
+
+def target_options(verb: Callable[..., int]) -> Callable[..., int]:
+    """Add the options that select a ledger or a running monitor."""
+    return functools.reduce(lambda changed, add: add(changed), reversed(_TARGET), verb)
+
+
+def _live_node(config: Path | None, ledger: Path | None, node: str | None, **_: Any) -> str | None:
+    """Name of the running monitor that is asked for; None for a ledger."""
+    if node is None or config is not None:
+        return None
+    if ledger is not None:
+        raise click.UsageError("--node cannot be combined with --ledger")
+    return node
+
+
 @contextmanager
 def opened(
-    config: Path | None, ledger: Path | None, node: str | None, joint: str | None = None
+    joint: str | None = None, *, config: Path | None, ledger: Path | None, node: str | None, **_: Any
 ) -> Iterator["WearMonitor"]:
     """A monitor on the ledger that is asked for; the ledger is written at the end or not at all."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -94,23 +133,19 @@ def _answered(reply: str) -> int:
 
 
 @click.command(short_help="Acknowledge the alarms.")
-@common.config_option
-@common.ledger_option
-@common.node_option
-@common.wait_option
-def acknowledge(config: Path | None, ledger: Path | None, node: str | None, wait_s: float) -> int:
+@target_options
+def acknowledge(**target: Any) -> int:
     """Acknowledge all alarms. Alarms whose values are normal again clear.
 
     The service ~/acknowledge_alarms does the same. The other alarms stay, marked as acknowledged, and clear
     when their values are normal again. A running monitor locks its ledger: name it with --node, or stop it
     first.
     """
-    if node is not None and config is None:
-        common.check_alone(ledger=ledger)
-        return _triggered(node, "acknowledge_alarms", wait_s)
+    if (live := _live_node(**target)) is not None:
+        return _triggered(live, "acknowledge_alarms", target["wait_s"])
     from leg_wear_monitor.monitor.operator_actions import alarm_words
 
-    with opened(config, ledger, node) as monitor:
+    with opened(**target) as monitor:
         _need_wear(monitor)
         line = alarm_words(*monitor.acknowledge(time.time_ns()))
     click.echo(line)  # once it is written
@@ -122,32 +157,21 @@ def acknowledge(config: Path | None, ledger: Path | None, node: str | None, wait
 
 @click.command(short_help="Enter a replaced part.")
 @click.argument("joint")
-@common.config_option
-@common.ledger_option
-@common.node_option
-@common.wait_option
+@target_options
 @click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
-def reset(
-    joint: str,
-    config: Path | None,
-    ledger: Path | None,
-    node: str | None,
-    wait_s: float,
-    undo: bool,
-) -> int:
+def reset(joint: str, undo: bool, **target: Any) -> int:
     """Enter a replaced part of JOINT: its wear starts at 0, and its history stays in the ledger.
 
     JOINT is a name or a label, such as knee; with --node, a name. The alarms of the old part are acknowledged
     and clear. A running monitor locks its ledger: name it with --node, or stop it first.
     """
-    if node is not None and config is None:
-        common.check_alone(ledger=ledger)
+    if (live := _live_node(**target)) is not None:
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
-        return _triggered(node, service, wait_s, times=1 if undo else 2)  # a reset is confirmed
+        return _triggered(live, service, target["wait_s"], times=1 if undo else 2)  # a reset is confirmed
     from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 
     now_ns, who = time.time_ns(), getpass.getuser()
-    with opened(config, ledger, node, joint) as monitor:
+    with opened(joint, **target) as monitor:
         _need_wear(monitor)
         joint = monitor.mechanism.clearance_joint(joint)
         if undo:
@@ -171,26 +195,15 @@ def reset(
 @click.argument("joint")
 @click.argument("mm", type=common.POSITIVE, required=False)
 @common.option("--sigma", "MM", "Standard deviation of the measurement [mm].", type=common.POSITIVE)
-@common.config_option
-@common.ledger_option
 @click.option("--accept", is_flag=True, help="Use the measurement even if it contradicts the model.")
-@common.node_option
-@common.wait_option
+@target_options
 @click.option(
     "--withdraw",
     is_flag=True,
     help="Withdraw the last measurement of JOINT: it stays in the ledger and no longer counts.",
 )
 def measure(
-    joint: str,
-    mm: float | None,
-    sigma: float | None,
-    config: Path | None,
-    ledger: Path | None,
-    accept: bool,
-    node: str | None,
-    wait_s: float,
-    withdraw: bool,
+    joint: str, mm: float | None, sigma: float | None, accept: bool, withdraw: bool, **target: Any
 ) -> int:
     """Enter the measured mean radial clearance of JOINT, a name or a label such as knee, in millimetres.
 
@@ -199,25 +212,25 @@ def measure(
     first. The modelled clearance does not change. Exit code 1 if the measurement contradicts the model or is
     at its limit.
     """
-    is_live = node is not None and config is None
-    if is_live:
-        common.check_alone(ledger=ledger, withdraw=withdraw)
+    live = _live_node(**target)
     if withdraw:
+        if live is not None:
+            raise click.UsageError("--node cannot be combined with --withdraw")
         if mm is not None or sigma is not None or accept:
             raise click.UsageError("--withdraw cannot be combined with MM, --sigma or --accept")
-        with opened(config, ledger, node, joint) as monitor:
+        with opened(joint, **target) as monitor:
             line = _withdraw(monitor, joint)
         click.echo(line)
         return 0
     if mm is None or sigma is None:
         raise click.UsageError("expected JOINT MM --sigma MM, or JOINT --withdraw")
     size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
-    if node is not None and is_live:
+    if live is not None:
         common.need_rclpy()
         from leg_wear_monitor.ros.measure import measure_on
 
-        return _answered(measure_on(node, *size, accept, wait_s))
-    with opened(config, ledger, node, joint) as monitor:
+        return _answered(measure_on(live, *size, accept, target["wait_s"]))
+    with opened(joint, **target) as monitor:
         found = monitor.measure(*size, time.time_ns(), getpass.getuser(), accept)
     click.echo("\n".join(found.lines))
     return common.WITH_FINDINGS if found.codes else 0

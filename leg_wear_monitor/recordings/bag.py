@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 
 import attrs
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from leg_wear_monitor.errors import system_asked
-from leg_wear_monitor.monitor.alarms import amount, time_words
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.findings import (
     CSV,
@@ -32,7 +30,6 @@ from leg_wear_monitor.recordings.findings import (
 from leg_wear_monitor.recordings.mcap_file import McapFile
 from leg_wear_monitor.recordings.streams import Stream, streams_of
 from leg_wear_monitor.twin import TORQUE
-from leg_wear_monitor.twin.tracker_state import BACKWARD_JUMP_NS
 
 # Resolve the user's paths to an ordered list of recordings: bags (plain, split, compressed) and tables.
 
@@ -253,44 +250,6 @@ class OpenFile(Protocol):
         """Pieces of the channels in `types` (stream code by channel number)."""
 
 
-class ClockSteps:
-    """Steps back of the clock that stamped the samples of one file; one sample alone is none.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-
-    Attributes
-    ----------
-    findings : list of Finding
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._shifts_ns = [0]  # after each step, for all series: they keep their order to each other
-        self._last: dict[Any, tuple[int, int]] = {}
-        self.findings: list[Finding] = []
-
-    def continued(self, series: Any, times_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Times [ns] of a series in order of arrival, shifted so that they go on after each step."""
-        if not len(times_ns):
-            return times_ns
-        last_ns, steps = self._last.get(series, (int(times_ns[0]), 0))
-        beside = np.concatenate([[last_ns], times_ns, times_ns[-1:]])
-        steady = np.sort([beside[:-2], beside[1:-1], beside[2:]], axis=0)[1]
-        back = np.diff(steady, prepend=last_ns) < -BACKWARD_JUMP_NS
-        for at in np.flatnonzero(back)[max(0, len(self._shifts_ns) - 1 - steps) :].tolist():
-            before_ns = int(steady[at - 1]) if at else last_ns
-            step_ns = before_ns - int(times_ns[at])
-            self._shifts_ns.append(self._shifts_ns[-1] + step_ns + BACKWARD_JUMP_NS)
-            step, since = amount(1.0e-9 * step_ns, "s"), time_words(before_ns)
-            text = f"has stamps that go back by {step} after {since}: the clock was set back"
-            self.findings.append(Finding(self._path, text, Severity.NOTE))
-        numbers = steps + np.cumsum(back)
-        self._last[series] = int(steady[-1]), int(numbers[-1])
-        return np.asarray(times_ns + np.array(self._shifts_ns)[numbers])
-
-
 @attrs.define(eq=False)
 class Source:
     """An open file of a recording, and the channels to read with their stream codes."""
@@ -298,12 +257,6 @@ class Source:
     bag_file: BagFile
     file: OpenFile
     types: dict[int, int] = attrs.Factory(dict)
-    steps: ClockSteps = attrs.Factory(lambda self: ClockSteps(self.bag_file.path), takes_self=True)
-
-    @property
-    def findings(self) -> list[Finding]:
-        """Faults so far; complete after all pieces have been read."""
-        return self.file.findings + self.steps.findings
 
     def select(self, stream: Stream, topic: str) -> None:
         """Select the channels of a topic, to be read as a stream."""

@@ -34,6 +34,7 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
     Samples,
 )
+from leg_wear_monitor.twin.tracker_state import BACKWARD_JUMP_NS
 
 # Check that several files record one leg: the same topics, and the crank joint in their messages.
 
@@ -236,6 +237,29 @@ class Pauses:
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
 
 
+# A clock that was set back.
+
+
+def clock_steps(path: Path, times_ns: NDArray[np.int64]) -> tuple[NDArray[np.bool_], list[Finding]]:
+    """Where times go back although the samples go on, (n,), and a finding for each such step.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    times_ns : (n,) array of int
+        Times in order of arrival. One alone that is wrong is no step.
+    """
+    beside = np.concatenate([times_ns[:1], times_ns, times_ns[-1:]])
+    steady = np.sort([beside[:-2], beside[1:-1], beside[2:]], axis=0)[1]
+    back = np.diff(steady, prepend=steady[:1]) < -BACKWARD_JUMP_NS
+    findings = []
+    for at in np.flatnonzero(back).tolist():
+        step = amount(1.0e-9 * int(times_ns[at - 1] - times_ns[at]), "s")
+        text = f"has stamps that go back by {step} after {time_words(int(times_ns[at - 1]))}"
+        findings.append(Finding(path, f"{text}: the clock was set back", Severity.NOTE))
+    return np.asarray(back), findings
+
+
 # Check that a torque without header, which has log times, fits the header stamps of the crank.
 
 
@@ -316,7 +340,7 @@ class Recording:
         if time not in TIMES:
             raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
         self.time = time
-        self._clocks = Clocks()
+        self._clocks, self._last_ns = Clocks(), dict[int, NDArray[np.int64]]()
         self._decoder = Decoder(config)
         bag_files, self._findings = bag.find_files(paths), list[Finding]()
         self._axis = WrenchAxis(config.drive_torque.axis)
@@ -349,7 +373,7 @@ class Recording:
     @property
     def findings(self) -> list[Finding]:
         """Findings so far; complete after all blocks have been read."""
-        found = [each for source in self._sources for each in source.findings]
+        found = [each for source in self._sources for each in source.file.findings]
         return self._findings + found + self._pauses.findings
 
     @property
@@ -372,11 +396,20 @@ class Recording:
         """
         with reading(self.files):
             for block in self._joined():
+                self._note_clock_steps(block)
                 yield from self._pauses.cut(block)
         self._findings += self._joints.findings(self.files[0])
         notes, other_axis = self._clocks.notes(), self._axis.report()
         self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
         self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
+
+    def _note_clock_steps(self, block: Block) -> None:
+        cranks = (block.samples["kind"] == CRANK) & (block.samples["fault"] == NO_FAULT)
+        for number in np.unique(block.source).tolist():
+            stamps = block.samples["stamp_ns"][cranks & (block.source == number)]
+            stamps = np.append(self._last_ns.get(number, stamps[:1]), stamps)
+            self._findings += clock_steps(self.files[number], stamps)[1]
+            self._last_ns[number] = stamps[-1:]
 
     def _joined(self) -> Iterator[Block]:
         """Samples of all files in order of log time."""
@@ -384,6 +417,7 @@ class Recording:
         none: NDArray[np.int64] = np.zeros(0, np.int64)
         waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
         for number, piece in self._pieces():
+            bag_file = self._sources[number].bag_file
             passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
@@ -391,7 +425,7 @@ class Recording:
             read += piece.stored
             times = piece.messages["log_time_ns"]
             source = np.full(len(times), number, np.int64)
-            new = Block(self._samples(self._sources[number], piece), times, min(read / total, 1.0), source)
+            new = Block(self._samples(bag_file, piece), times, min(read / total, 1.0), source)
             waiting = _merged(waiting, new)
         if len(waiting.samples):
             yield attrs.evolve(waiting, fraction=1.0)
@@ -406,15 +440,13 @@ class Recording:
             if piece is not None:
                 yield number, piece
 
-    def _samples(self, source: bag.Source, piece: Piece) -> Samples:
+    def _samples(self, bag_file: bag.BagFile, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
-        table = piece.samples
-        samples = self._decoder.many(piece.data, piece.messages) if table is None else table
-        cranks = (samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT)
-        source.steps.continued("stamp", samples["stamp_ns"][cranks])
-        source.steps.continued("log", piece.messages["log_time_ns"])
-        if table is not None:  # a table has one clock only
-            return self._decoder.scaled(table)
+        if piece.samples is not None:  # a table has one clock only
+            return self._decoder.scaled(piece.samples)
+        samples = self._decoder.many(piece.data, piece.messages)
+        cranks = piece.messages["type"] == JOINT_STATE
+        self._findings += clock_steps(bag_file.path, piece.messages["log_time_ns"][cranks])[1]
         self._joints.add_samples(piece, samples)
         wrenches = np.flatnonzero(
             (piece.messages["type"] == WRENCH_STAMPED)

@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -20,9 +21,11 @@ from leg_wear_monitor.recordings.bag import Recordable, Source, check_channel, f
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.findings import Channel, Finding, Piece, RecordingError, Severity
 from leg_wear_monitor.recordings.message_checks import interfaces_in, names_in, twice
+from leg_wear_monitor.recordings.reader import clock_steps
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
+from leg_wear_monitor.twin.tracker_state import BACKWARD_JUMP_NS
 
 # Identity of a series: each joint is a candidate for the crank, each torque for the drive torque.
 
@@ -140,17 +143,39 @@ def read_signals(
             raise RecordingError(where, "joint_states", "no topic of sensor_msgs/msg/JointState")
         read, total = 0, max(1, sum(source.file.size for source in sources))
         for source, chosen in zip(sources, streams, strict=True):
+            parts: dict[_Name, list[Any]] = {}
             for _, load in source.pieces():
                 piece = load()
                 if piece is not None:  # a damaged piece is a finding of its file
-                    for name, stamps, values in _piece_series(source, chosen, piece, config):
-                        recording = np.full(len(stamps), source.bag_file.recording)
-                        part = source.steps.continued(name, stamps), values, recording
-                        collected.setdefault(name, []).append(part)
+                    for name, part in _piece_series(source, chosen, piece, config):
+                        parts.setdefault(name, []).append(part)
                     read += piece.stored
                     progress(min(1.0, read / total))
-            findings += source.findings
+            findings += source.file.findings
+            for name, stamps, values in _continued(source.bag_file.path, parts, findings):
+                recording = np.full(len(stamps), source.bag_file.recording)
+                collected.setdefault(name, []).append((stamps, values, recording))
     return _signals(collected), findings
+
+
+def _continued(
+    path: Path, parts: dict[_Name, list[Any]], findings: list[Finding]
+) -> Iterator[tuple[_Name, NDArray[np.int64], NDArray[np.float64]]]:
+    """Each series of a file in order of arrival; after a step back of the clock, its stamps go on."""
+    shifts_ns = [0]  # after each step, the same for all series, which thus keep their order
+    for name, pieces in parts.items():
+        if isinstance(name, JointName):
+            steps = (one for piece in pieces for one in clock_steps(path, piece[0])[1])
+            findings += [one for one in dict.fromkeys(steps) if one not in findings]
+        logged, stamps, values = map(np.concatenate, zip(*pieces, strict=True))
+        order = np.argsort(logged, kind="stable")
+        stamps, values = stamps[order], values[order]
+        back, found = clock_steps(path, stamps)
+        known = len(shifts_ns) - 1
+        findings += found[known:]
+        for at in np.flatnonzero(back)[known:].tolist():
+            shifts_ns.append(shifts_ns[-1] + int(stamps[at - 1] - stamps[at]) + BACKWARD_JUMP_NS)
+        yield name, stamps + np.array(shifts_ns)[np.cumsum(back)], values
 
 
 def _select(
@@ -187,8 +212,8 @@ def _stream(channel: Channel, joint_states: str | None, drive_torque: str | None
 
 def _piece_series(
     source: Source, streams: dict[int, Stream], piece: Piece, config: MonitorConfig
-) -> Iterator[tuple[_Name, NDArray[np.int64], NDArray[np.float64]]]:
-    """Stamps [ns] and values of each joint and torque in a piece."""
+) -> Iterator[tuple[_Name, tuple[NDArray[Any], ...]]]:
+    """Log times and stamps [ns], and values of each joint and torque in a piece."""
     channels = source.file.channels
     for number in np.unique(piece.messages["type"]).tolist():
         topic, stream = channels[number - 1].topic, streams[number]
@@ -204,8 +229,9 @@ def _piece_series(
             is_unstamped = samples["fault"] == ZERO_STAMP
             largest = KINDS[CRANK if isinstance(name, JointName) else TORQUE].largest
             is_usable = (is_unstamped | (samples["fault"] == NO_FAULT)) & (np.abs(values) <= largest)
-            stamps = np.where(is_unstamped, chosen["log_time_ns"], samples["stamp_ns"])[is_usable]
-            yield name, stamps, values[is_usable]
+            logged = chosen["log_time_ns"]
+            stamps = np.where(is_unstamped, logged, samples["stamp_ns"])
+            yield name, (logged[is_usable], stamps[is_usable], values[is_usable])
 
 
 def _table_series(topic: str, stream: Stream, samples: Samples, config: MonitorConfig) -> _Found:

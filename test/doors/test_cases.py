@@ -306,7 +306,7 @@ def test_a_clock_that_is_set_back_is_reported_alike_in_a_bag_and_in_a_table(
     for recording in (rewritten(tmp_path / "back.mcap", earlier), table):
         result = lw.replay(recording, BAG.with_suffix(".yaml"))
         (finding,) = (one.text for one in result.summary().recording.findings)
-        assert "has stamps that go back by 2.99 s after 2026-" in finding
+        assert "has stamps that go back by 3 s after 2026-" in finding
         assert result.summary().cycles >= 8
         proposed = lw.commission(recording, config=BAG.with_suffix(".yaml"))
         assert finding in [one.text for one in proposed.faults]

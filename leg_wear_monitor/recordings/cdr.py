@@ -355,9 +355,6 @@ def decode(
 # Decoding of messages to gait samples: selects crank, torque and foot load, and applies signs and scales.
 
 
-_AXES = {"x": 0, "y": 1, "z": 2}
-
-
 class Decoder:
     """Decodes messages to samples, singly or in bulk, with identical results; used live and in replay.
 
@@ -373,7 +370,7 @@ class Decoder:
         self._crank_scale = crank.sign / crank.gear_ratio
         self._offset_rad = crank.offset_rad
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
-        self._axis = _AXES[torque.axis]
+        self._axis = "xyz".index(torque.axis)
         self._effort = torque.source == "effort"
         self._interface, self._thermal = (
             np.frombuffer(name.encode(), np.uint8)

@@ -6,12 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.cdr import ENCAPSULATION
+from leg_wear_monitor.recordings.findings import listed
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
-
-_MOST_NAMED = 20
 
 
 class _Fields:
@@ -90,17 +88,12 @@ def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> 
     """
     there = interfaces_in(raw)
     if joint not in there:
-        return f"no joint is named {joint!r}; there are {_listed(list(there))}"
+        return f"no joint is named {joint!r}; there are {listed(sorted(there))}"
     absent = {key: name for key, name in interfaces.items() if name and name not in there[joint]}
     if not absent:
         return f"{joint} has no value of {' or '.join(filter(None, interfaces.values()))} yet"
     names, keys = " and ".join(map(repr, absent.values())), " and ".join(absent)
-    return f"{joint} has no interface {names}, it has {_listed(there[joint])}; set {keys}"
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(printable(name, 100) for name in sorted(set(names))[:_MOST_NAMED]) or "none"
-    return f"{shown} and more" if len(set(names)) > _MOST_NAMED else shown
+    return f"{joint} has no interface {names}, it has {listed(sorted(there[joint]))}; set {keys}"
 
 
 # Check that the drive torque is about the axis that is read; otherwise report the axis that carries one.

@@ -16,9 +16,10 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from leg_wear_monitor.errors import ConfigError, printable
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.cdr import MESSAGE, Decoder
+from leg_wear_monitor.recordings.findings import listed
 from leg_wear_monitor.recordings.message_checks import is_without, names_in, twice, without_interface
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, Stream, streams_of
 from leg_wear_monitor.twin import LOAD
@@ -121,7 +122,7 @@ class Inbox:
 # Check that messages contain the crank joint; otherwise report the joints they contain.
 
 
-_MOST_NAMES, _MOST_LETTERS, _MOST_BYTES = 12, 40, 100_000
+_MOST_BYTES = 100_000
 _MOST_PUBLISHERS, _UNNAMED_OF_A_BLOCK = 8, 20
 
 
@@ -170,23 +171,15 @@ class CrankNames:
         elif unnamed:
             names = sorted({name for joints in unnamed for name in joints})
             again = next(filter(None, (twice(joints, self._crank) for joints in unnamed)), "")
-            self._report = again or (
-                f"no joint is named {self._crank!r}; there are {_named(names)}; set crank_joint to its name"
-            )
+            there = listed(names) if names else "too many to list"
+            text = f"no joint is named {self._crank!r}; there are {there}; set crank_joint to its name"
+            self._report = again or text
         return self._report
 
 
 def _names(raw: bytes) -> tuple[str, ...]:
     """Joint names of a message; none of a message with too many."""
     return tuple(names_in(raw)) if len(raw) <= _MOST_BYTES else ()
-
-
-def _named(names: Sequence[str]) -> str:
-    """Names as printable text."""
-    shown = ", ".join(printable(name, _MOST_LETTERS) for name in names[:_MOST_NAMES])
-    if not names:
-        return "too many to list"
-    return f"{shown} and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else shown
 
 
 class InterfaceNames:

@@ -71,6 +71,20 @@ def option(name: str, metavar: str, text: str, *own: str, **of_click: Any) -> Op
     return click.option(name, *own, metavar=metavar, help=text, show_default=True, **of_click)
 
 
+positive = partial(option, type=POSITIVE)
+count = partial(option, type=click.IntRange(min=1))
+
+
+def flag(name: str, text: str) -> Option:
+    """Option without a value."""
+    return click.option(name, is_flag=True, help=text)
+
+
+def choice(name: str, names: Sequence[str], text: str, **of_click: Any) -> Option:
+    """Option with one of several names."""
+    return click.option(name, type=click.Choice(names), help=text, show_default=True, **of_click)
+
+
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
     """Option with a path, such as a file that has to exist."""
     return option(name, metavar, text, type=click.Path(path_type=Path, **of_path), required=required)
@@ -80,10 +94,7 @@ file_option = partial(path_option, dir_okay=False)
 out_option = partial(path_option, "--out", "DIR")
 
 mechanism_option: Option = option(
-    "--mechanism",
-    "FILE",
-    "A mechanism file, or the name of one that comes with the package.",
-    default="bionic_leg",
+    "--mechanism", "FILE", "A mechanism file, or the name of one of the package.", default="bionic_leg"
 )
 clearances_option: Option = option(
     "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: the mechanism's own]"
@@ -94,12 +105,8 @@ speed_option: Option = option(
     "Crank speed [rpm], negative for clockwise.  [default: the mechanism's own]",
     type=float,
 )
-limit_option: Option = option(
-    "--limit-m",
-    "M",
-    "Mean radial clearance [m] at which a joint's life ends.",
-    type=POSITIVE,
-    default=6.0e-4,
+limit_option: Option = positive(
+    "--limit-m", "M", "Mean radial clearance [m] at which a joint's life ends.", default=6.0e-4
 )
 config_option: Option = path_option(
     "--config", "FILE", "Parameter file of the node.  [default: config/monitor.yaml of the package]"
@@ -110,13 +117,9 @@ section_option: Option = option(
     "Full name of the node whose parameters are read, such as /left/leg_wear_monitor.  "
     "[default: the only one in the file]",
 )
-workers_option: Option = option(
-    "--workers", "N", "Number of local processes.  [default: cores]", type=click.IntRange(min=1)
-)
+workers_option: Option = count("--workers", "N", "Number of local processes.  [default: cores]")
 scheduler_option: Option = option(
-    "--scheduler",
-    "ADDRESS",
-    "Dask scheduler, tcp://HOST:PORT; its workers compute instead of this machine.",
+    "--scheduler", "ADDRESS", "Dask scheduler, tcp://HOST:PORT; its workers compute instead of this machine."
 )
 recordings_argument: Option = click.argument(
     "recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING..."

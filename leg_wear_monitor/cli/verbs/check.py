@@ -316,10 +316,8 @@ def _in_full(pair: "Material") -> list[str]:
 
 
 @click.command(short_help="Show, fill or remove the compiled code on this machine.")
-@click.option(
-    "--fill", is_flag=True, help="Compile the kernels now instead of at the first start: about two minutes."
-)
-@click.option("--clear", is_flag=True, help="Remove the compiled code; the next start compiles it again.")
+@common.flag("--fill", "Compile the kernels now instead of at the first start: about two minutes.")
+@common.flag("--clear", "Remove the compiled code; the next start compiles it again.")
 def cache(fill: bool, clear: bool) -> None:
     """Show the directory and the size of the compiled code, remove it, or compile it ahead of time.
 

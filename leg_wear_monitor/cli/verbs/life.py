@@ -28,8 +28,8 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.clearances_option
 @common.speed_option
 @common.limit_option
-@common.option("--horizon-cycles", "N", "Largest number of gait cycles.", type=common.POSITIVE, default=1.0e9)
-@common.option("--wear-factor", "X", "Factor on all wear coefficients.", type=common.POSITIVE, default=1.0)
+@common.positive("--horizon-cycles", "N", "Largest number of gait cycles.", default=1.0e9)
+@common.positive("--wear-factor", "X", "Factor on all wear coefficients.", default=1.0)
 @common.option(
     "--duty",
     "N:H,...",
@@ -37,20 +37,14 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     "toe, as N:hours, such as 0:2,300:5,600:1.  "
     "[default: the mechanism's own loads]",
 )
-@common.option(
-    "--max-wear-per-jump-m",
-    "M",
-    "Deepest change of a surface in a jump [m].  [default: 3e-05]",
-    type=common.POSITIVE,
-)
-@common.option("--legs", "N", "Number of legs averaged.  [default: 2]", type=click.IntRange(min=1))
+@common.positive("--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump [m].  [default: 3e-05]")
+@common.count("--legs", "N", "Number of legs averaged.  [default: 2]")
 @common.option("--cycles", "N", "Gait cycles averaged per leg.  [default: 4]", type=click.IntRange(min=2))
-@common.option(
+@common.count(
     "--ensemble-size",
     "N",
     "Number of lives for --json. Lives after the first have different wear coefficients; they show the "
     "forecast how joints affect each other.",
-    type=click.IntRange(min=1),
     default=1,
 )
 @common.json_option("the life")
@@ -176,13 +170,7 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     "Hours per day at each peak of the ground's vertical force on the toe, as N:hours, such as 0:2,300:5.",
     default="0:8",
 )
-@common.option(
-    "--hours",
-    "H",
-    "Hours of walking that each joint should last.",
-    type=common.POSITIVE,
-    default=1000.0,
-)
+@common.positive("--hours", "H", "Hours of walking that each joint should last.", default=1000.0)
 @common.limit_option
 @common.option("--materials", "NAME,...", "Pairs to try.  [default: all that come with the package]")
 @common.option(

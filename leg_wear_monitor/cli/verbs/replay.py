@@ -28,13 +28,7 @@ TIMES = ("header", "log", "publish")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
 @common.out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
 @common.config_option
-@click.option(
-    "--time",
-    type=click.Choice(TIMES),
-    default="header",
-    show_default=True,
-    help="Source of the samples' stamps.",
-)
+@common.choice("--time", TIMES, "Source of the samples' stamps.", default="header")
 @common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: */joint_states]")
 @common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: */drive_torque]")
 @common.option("--foot-load", "TOPIC", "Topic of the foot load.  [default: */foot_load]")
@@ -48,9 +42,7 @@ TIMES = ("header", "log", "publish")
 @common.file_option(
     "--ledger", "FILE", "Ledger to continue or to start. The ledger in the parameters is never changed."
 )
-@click.option(
-    "--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording cannot be read."
-)
+@common.flag("--allow-partial", "Exit with 0 even if parts of the recording cannot be read.")
 @common.option(
     "--fail-on",
     "WHAT",

@@ -154,32 +154,22 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 @click.command(short_help="Simulate the leg offline, ideal or with clearances.")
 @common.mechanism_option
 @common.clearances_option
-@common.option(
-    "--clearance-m",
-    "M",
-    "Radial clearance [m].  [default: the mechanism's own]",
-    type=common.POSITIVE,
-)
+@common.positive("--clearance-m", "M", "Radial clearance [m].  [default: the mechanism's own]")
 @common.speed_option
-@common.option("--cycles", "N", "Gait cycles in the results.  [default: 5]", type=common.POSITIVE)
-@common.option(
-    "--duration", "S", "Duration of the results [s], instead of --cycles.", "duration_s", type=common.POSITIVE
-)
+@common.positive("--cycles", "N", "Gait cycles in the results.  [default: 5]")
+@common.positive("--duration", "S", "Duration of the results [s], instead of --cycles.", "duration_s")
 @common.option(
     "--skip-cycles",
     "N",
     "Gait cycles skipped before the results.  [default: 1; 0 with --duration]",
     type=common.Number(min=0.0),
 )
-@click.option(
-    "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
-)
-@click.option(
+@common.choice("--model", MODELS, f"Formulation of the motion.  [default: {DEFAULT_MODEL}]")
+@common.choice(
     "--wear",
-    type=click.Choice(("on", "off")),
+    ("on", "off"),
+    "on: the clearances grow by wear during the run. The results contain the wear in both cases.",
     default="off",
-    show_default=True,
-    help="on: the clearances grow by wear during the run. The results contain the wear in both cases.",
 )
 @common.option(
     "--normal-law",
@@ -187,9 +177,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
     type=click.Choice(NORMAL_LAWS),
 )
-@common.option(
-    "--restitution", "E", "Coefficient of restitution of all clearance joints.", type=common.POSITIVE
-)
+@common.positive("--restitution", "E", "Coefficient of restitution of all clearance joints.")
 @common.option(
     "--friction",
     "NAME",
@@ -212,10 +200,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     "than the simulation.",
 )
 @common.option(
-    "--intervals",
-    "N",
-    "Model clearance: time intervals per gait cycle.  [default: 2048]",
-    type=int,
+    "--intervals", "N", "Model clearance: time intervals per gait cycle.  [default: 2048]", type=int
 )
 @common.json_option("the result")
 @common.out_option("Write result.json and pictures of the leg and its worn bushings.")

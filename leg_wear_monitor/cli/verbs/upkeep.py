@@ -32,12 +32,11 @@ _TARGET = (
         "Full name of a running monitor, such as /left/leg_wear_monitor. With --config: of the node whose "
         "parameters and ledger are used.",
     ),
-    common.option(
+    common.positive(
         "--wait",
         "S",
         "With --node: longest wait [s] for the monitor, and then for its answer.",
         "wait_s",
-        type=common.POSITIVE,
         default=10.0,
     ),
 )
@@ -158,7 +157,7 @@ def acknowledge(**target: Any) -> int:
 @click.command(short_help="Enter a replaced part.")
 @click.argument("joint")
 @target_options
-@click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
+@common.flag("--undo", "Undo the last reset: the part was not replaced.")
 def reset(joint: str, undo: bool, **target: Any) -> int:
     """Enter a replaced part of JOINT: its wear starts at 0, and its history stays in the ledger.
 
@@ -194,13 +193,11 @@ def reset(joint: str, undo: bool, **target: Any) -> int:
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint")
 @click.argument("mm", type=common.POSITIVE, required=False)
-@common.option("--sigma", "MM", "Standard deviation of the measurement [mm].", type=common.POSITIVE)
-@click.option("--accept", is_flag=True, help="Use the measurement even if it contradicts the model.")
+@common.positive("--sigma", "MM", "Standard deviation of the measurement [mm].")
+@common.flag("--accept", "Use the measurement even if it contradicts the model.")
 @target_options
-@click.option(
-    "--withdraw",
-    is_flag=True,
-    help="Withdraw the last measurement of JOINT: it stays in the ledger and no longer counts.",
+@common.flag(
+    "--withdraw", "Withdraw the last measurement of JOINT: it stays in the ledger and no longer counts."
 )
 def measure(
     joint: str, mm: float | None, sigma: float | None, accept: bool, withdraw: bool, **target: Any

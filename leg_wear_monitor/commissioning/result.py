@@ -127,6 +127,12 @@ class CommissioningResult:
         """True if every parameter was determined, and everything fits."""
         return self.config is not None and not self.not_told and not self.findings
 
+    @property
+    def remarks(self) -> list[str]:
+        """Parameters that are not determined, contradictions, and notes, one line each."""
+        labels = {"not determined": self.not_told, "does not fit": self.findings, "note": self.notes}
+        return [f"{label}: {text}" for label, texts in labels.items() for text in texts]
+
     def item(self, name: str) -> CommissioningItem:
         """The item of a name; raises KeyError if there is none."""
         return {each.name: each for each in self.items}[name]
@@ -169,6 +175,4 @@ class CommissioningResult:
         """
         if self.config is None:
             raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
-        labels = {"not determined": self.not_told, "does not fit": self.findings, "note": self.notes}
-        remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
-        return parameter_text(self.config, remarks)
+        return parameter_text(self.config, self.remarks)

@@ -8,8 +8,9 @@ import numpy as np
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
+from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, guide_to
@@ -83,8 +84,9 @@ class LegSetup:
     shape: ReplayLeg
 
 
-def leg_setup(config: MonitorConfig, mechanism: Mechanism) -> LegSetup:
-    """The leg of a configuration, for a mechanism that `fitted` returned."""
+def leg_setup(config: MonitorConfig, source: str = "parameters") -> LegSetup:
+    """The leg of a configuration; ``source`` is its origin, for messages."""
+    mechanism = fitted(load_mechanism(config.mechanism), config, source)
     return LegSetup(settings_of(config, mechanism), leg_shape(mechanism))
 
 

@@ -24,8 +24,7 @@ from std_msgs.msg import String
 from leg_wear_monitor.dashboard.leg_page import LegSetup, leg_setup
 from leg_wear_monitor.dashboard.live_leg import MOST, LiveLeg, received_status
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
-from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
-from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.mechanism.loader import is_file_name, shipped_mechanisms
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from, is_of_node
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.result import ReplayStatus
@@ -158,7 +157,7 @@ def _setup(given: dict[str, Any], monitor: str) -> LegSetup:
             f"the monitor has a mechanism of its own, {printable(config.mechanism)}; "
             "give the parameter file of the monitor by --config FILE"
         )
-    return leg_setup(config, fitted(load_mechanism(config.mechanism), config, monitor))
+    return leg_setup(config, monitor)
 
 
 def _profile(qos: Qos) -> QoSProfile:

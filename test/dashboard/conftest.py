@@ -11,8 +11,6 @@ from heard_leg import NODE, Clock, walk
 
 from leg_wear_monitor.dashboard.leg_page import leg_setup
 from leg_wear_monitor.dashboard.live_leg import LiveLeg
-from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
@@ -24,7 +22,7 @@ def clock():
 @pytest.fixture(scope="session")
 def setup():
     config = MonitorConfig(hardware_id="left")
-    return leg_setup(config, fitted(load_mechanism("bionic_leg"), config))
+    return leg_setup(config)
 
 
 @pytest.fixture

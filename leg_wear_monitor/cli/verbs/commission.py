@@ -105,14 +105,8 @@ def _print(result: "CommissioningResult") -> None:
         table.add_row(item.name, f"{_shown(item.value)} {item.unit}".strip(), *shown)
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n", table, sep="\n")
     console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
-    texts = {
-        "not determined": result.not_told,
-        "does not fit": result.findings,
-        "note": result.notes,
-    }
-    for label, sentences in texts.items():
-        for sentence in sentences:
-            console.print(f"{label}: {printable(sentence)}", soft_wrap=True)
+    for remark in result.remarks:
+        console.print(printable(remark), soft_wrap=True)
     if result.config is None:
         console.print("no parameters are proposed, because a choice is not certain")
 

@@ -22,7 +22,6 @@ from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.files import share_directory
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.dashboard.leg_page import LegSetup
     from leg_wear_monitor.dashboard.live_leg import LiveLeg
     from leg_wear_monitor.dashboard.server import Place
 
@@ -273,23 +272,15 @@ def dashboard(node: str, config: Path | None, host: str, port: int) -> int:
 @contextmanager
 def _live(node: str, config: Path | None) -> Iterator["LiveLeg"]:
     common.need_rclpy()
+    from leg_wear_monitor.dashboard.leg_page import leg_setup
     from leg_wear_monitor.dashboard.live_leg import LiveLeg
+    from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.ros.listeners import full_name, listening, topics_of
 
     name = full_name(node)
     leg = LiveLeg(name, topics_of(name), time.monotonic)
-    with listening(name, leg, _setup(config, name) if config else None):
+    with listening(name, leg, leg_setup(load_config(config, name)) if config else None):
         yield leg
-
-
-def _setup(config: Path, node: str) -> "LegSetup":
-    from leg_wear_monitor.dashboard.leg_page import leg_setup
-    from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.config.fitting import fitted
-    from leg_wear_monitor.monitor.config.parameters import load_config
-
-    settings = load_config(config, node)
-    return leg_setup(settings, fitted(load_mechanism(settings.mechanism), settings))
 
 
 def _serve(leg: "LiveLeg", place: "Place") -> None:

@@ -58,10 +58,6 @@ class DatabaseFile:
             number: Channel(one.topic, one.msgtype, getattr(one.ext, "serialization_format", ""))
             for number, one in self._connections.items()
         }
-        unlisted = self._reader.message_count - sum(one.msgcount for one in self._connections.values())
-        if unlisted:
-            text = f"contains {unlisted} messages of topics that it does not list: they are lost"
-            self.findings.append(Finding(path, text))
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Pieces of the requested channels; unreadable messages are skipped.

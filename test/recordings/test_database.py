@@ -36,14 +36,6 @@ def test_a_file_that_was_not_closed_is_a_loss_with_the_remedy(tmp_path, path, se
     assert text == ('was not closed: left.db3-wal is not read. Run: sqlite3 left.db3 "PRAGMA wal_checkpoint"')
 
 
-def test_messages_of_no_topic_are_reported(path, read):
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute("UPDATE messages SET topic_id = 77 WHERE id % 2 = 0")
-        (count,) = database.execute("SELECT COUNT(*) FROM messages WHERE topic_id = 77").fetchone()
-    _, recording = read(path)
-    assert losses(recording) == [f"contains {count} messages of topics that it does not list: they are lost"]
-
-
 def test_without_an_index_of_time_the_order_is_the_same(path, sent, expected, read):
     with closing(sqlite3.connect(path)) as database, database:
         query = "SELECT name FROM sqlite_master WHERE sql LIKE 'CREATE INDEX%'"

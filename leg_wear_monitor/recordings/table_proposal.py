@@ -8,12 +8,14 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.config.tables import COUNTS, DATE, Columns
 from leg_wear_monitor.recordings.bag import find_files
 from leg_wear_monitor.recordings.findings import Finding, listed, open_recording
+from leg_wear_monitor.recordings.reader import clock_steps
 from leg_wear_monitor.recordings.table_file import FOOT_LOAD, FOOT_LOAD_ALONG, TableFile, open_table
 from leg_wear_monitor.recordings.table_head import (
     CRANK_ANGLE,
@@ -203,21 +205,21 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
     (file,) = find_files([path])
     with open_recording(path) as content:
         table = TableFile(path, content, file.storage, config)
-        stamps, counts = list[int](), 0
+        parts = list[NDArray[np.int64]]()
         numbers = dict.fromkeys((column.key for column in table.columns), 0)
         ranges: dict[str, tuple[float, float]] = {}
         for rows in table.rows:
-            counts += len(rows.stamp_ns)
-            stamps += rows.stamp_ns[[0, -1]].tolist() if len(rows.stamp_ns) else []
+            parts.append(rows.stamp_ns)
             for key, values in rows.values.items():
                 numbers[key] += int(np.count_nonzero(rows.measured[key]))
                 if len(finite := values[np.isfinite(values)]):
                     least, most = ranges.get(key, (np.inf, -np.inf))
                     ranges[key] = min(least, finite.min()), max(most, finite.max())
-    seconds = (stamps[-1] - stamps[0]) * 1.0e-9
-    rate = f", {(counts - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
+    stamps = np.concatenate(parts)
+    seconds = 1.0e-9 * int(stamps[-1] - stamps[0])
+    rate = f", {(len(stamps) - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
     of = next((f"time {one}" for one in table.columns if one.key == STAMP), "no column of the time")
-    lines = [f"table of {counts} rows over {seconds:.6g} s{rate}; {of}"]
+    lines = [f"table of {len(stamps)} rows over {seconds:.6g} s{rate}; {of}"]
     for column in table.columns:
         if column.key != STAMP:
             found = ", all of them NaN or infinite" if numbers[column.key] else ""
@@ -226,4 +228,4 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
                 found = f", {least:.4g} to {most:.4g} {_SI.get(column.key, 'rad')}"
             lines.append(f"{column.key} {column}: {numbers[column.key]} values{found}")
     others = [f"not read: {', '.join(printable(name, 100) for name in table.others)}"] if table.others else []
-    return [*lines, *others], table.findings
+    return [*lines, *others], table.findings + clock_steps(path, stamps)[1]

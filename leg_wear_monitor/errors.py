@@ -102,7 +102,7 @@ def system_asked(
     try:
         yield
     except OSError as error:
-        raise error_of(str(source), str(key), f"{fault}: {error.strerror}") from error
+        raise error_of(str(source), str(key), f"{fault}: {error.strerror or error}") from error
 
 
 # Optional modules.

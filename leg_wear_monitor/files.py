@@ -131,9 +131,8 @@ def read_json(path: str) -> Any:
         If it cannot be read, or is not JSON.
     """
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+        with system_asked(path, "cannot be read"):
+            return json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise ConfigError(path, "", f"is not JSON: {' '.join(str(error).split())}") from error
 

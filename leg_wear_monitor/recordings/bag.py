@@ -356,21 +356,20 @@ def assign(
 def _open(bag_file: BagFile, config: MonitorConfig, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
-        if bag_file.storage in TABLES:
-            from leg_wear_monitor.recordings.table_file import (
-                TableFile,  # pyarrow takes a quarter of a second
-            )
+        with system_asked(path, "cannot be read", error_of=RecordingError):
+            if bag_file.storage in TABLES:
+                from leg_wear_monitor.recordings.table_file import (
+                    TableFile,  # pyarrow takes a quarter of a second
+                )
 
-            is_file = bag_file.storage != IN_MEMORY
-            content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
-            return TableFile(path, content, bag_file.storage, config)
-        if bag_file.storage == MCAP:
-            return McapFile(path, stack.enter_context(open_recording(path)))
-        from leg_wear_monitor.recordings.database import DatabaseFile
+                is_file = bag_file.storage != IN_MEMORY
+                content = stack.enter_context(open_recording(path)) if is_file else bag_file.table
+                return TableFile(path, content, bag_file.storage, config)
+            if bag_file.storage == MCAP:
+                return McapFile(path, stack.enter_context(open_recording(path)))
+            from leg_wear_monitor.recordings.database import DatabaseFile
 
-        open_recording(path).close()  # SQLite does not say why it cannot open a file
-        return DatabaseFile(path, stack)
+            open_recording(path).close()  # SQLite does not say why it cannot open a file
+            return DatabaseFile(path, stack)
     except DamageError as error:
-        raise RecordingError(str(bag_file.path), "", str(error)) from error
-    except OSError as error:
-        raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
+        raise RecordingError(str(path), "", str(error)) from error

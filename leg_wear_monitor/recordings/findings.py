@@ -4,8 +4,7 @@ A recording may be damaged. A reader reads the usable part and lists the faults;
 raises an error.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from enum import Enum
 from pathlib import Path
 from typing import IO
@@ -34,21 +33,6 @@ class RecordingError(ConfigError):
     def is_passing(self) -> bool:
         """True if the system is at fault, such as a permission or a network, and not the recording."""
         return isinstance(self.__cause__, OSError) and bool(self.__cause__.errno)
-
-
-@contextmanager
-def reading(paths: Iterable[Path]) -> Iterator[None]:
-    """System errors while reading recordings that make them unusable, such as a bad sector.
-
-    Raises
-    ------
-    RecordingError
-    """
-    try:
-        yield
-    except OSError as error:
-        source = ", ".join(map(str, paths))
-        raise RecordingError(source, "", f"cannot be read: {error.strerror or error}") from error
 
 
 class Severity(Enum):

@@ -10,11 +10,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.errors import system_asked
 from leg_wear_monitor.monitor.alarms import amount, time_words
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import bag
 from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
-from leg_wear_monitor.recordings.findings import Finding, Piece, RecordingError, Severity, listed, reading
+from leg_wear_monitor.recordings.findings import Finding, Piece, RecordingError, Severity, listed
 from leg_wear_monitor.recordings.message_checks import (
     WrenchAxis,
     is_without,
@@ -394,7 +395,8 @@ class Recording:
         RecordingError
             At the end, if no message contains the crank; immediately, if the system cannot read the files.
         """
-        with reading(self.files):
+        named = ", ".join(map(str, self.files))
+        with system_asked(named, "cannot be read", error_of=RecordingError):
             for block in self._joined():
                 self._note_clock_steps(block)
                 yield from self._pauses.cut(block)

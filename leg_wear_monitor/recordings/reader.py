@@ -410,8 +410,9 @@ class Recording:
         for number in np.unique(block.source).tolist():
             stamps = block.samples["stamp_ns"][cranks & (block.source == number)]
             stamps = np.append(self._last_ns.get(number, stamps[:1]), stamps)
-            self._findings += clock_steps(self.files[number], stamps)[1]
-            self._last_ns[number] = stamps[-1:]
+            steps = clock_steps(self.files[number], stamps)[1]
+            self._findings += [one for one in steps if one not in self._findings]
+            self._last_ns[number] = stamps[-2:]  # two, because a wrong stamp may be the last one of a block
 
     def _joined(self) -> Iterator[Block]:
         """Samples of all files in order of log time."""

@@ -24,8 +24,8 @@ from leg_wear_monitor.recordings.message_checks import (
     wanted_interfaces,
     without_interface,
 )
-from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.twin import CRANK, TORQUE
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, streams_of
+from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
@@ -261,43 +261,10 @@ def clock_steps(path: Path, times_ns: NDArray[np.int64]) -> tuple[NDArray[np.boo
     return np.asarray(back), findings
 
 
-# Check that a torque without header, which has log times, fits the header stamps of the crank.
-
-
-_FAR_NS = 1_000_000_000
-
-
-class Clocks:
-    """Streams with messages, and how far the crank's header stamps are from its log times."""
-
-    def __init__(self) -> None:
-        self._seen: set[int] = set()
-        self._apart_ns: int | None = None
-
-    def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
-        """Update from messages and the samples decoded from them, stamped by their headers."""
-        good = samples["fault"] == NO_FAULT
-        self._seen |= set(np.unique(messages["type"][good]).tolist())
-        cranks = np.flatnonzero(good & (messages["type"] == JOINT_STATE))
-        if self._apart_ns is None and len(cranks):
-            k = cranks[0]
-            self._apart_ns = int(messages["log_time_ns"][k]) - int(samples["stamp_ns"][k])
-
-    def notes(self) -> list[str]:
-        """Disagreements of the clocks, one line each."""
-        if self._apart_ns is None or abs(self._apart_ns) <= _FAR_NS:
-            return []
-        return [
-            f"{stream.topic} has no header, so its stamps are log times; they are "
-            f"{self._apart_ns / 1e9:.6g} s after the header stamps of joint_states; try --time log"
-            for stream in STREAMS
-            if stream.code in self._seen and not stream.has_stamp
-        ]
-
-
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
 _COMPARED = 100  # wrenches per file to compare the axes
+_FAR_NS = 1_000_000_000  # between header stamps and log times
 
 
 class Recording:
@@ -341,7 +308,9 @@ class Recording:
         if time not in TIMES:
             raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
         self.time = time
-        self._clocks, self._last_ns = Clocks(), dict[int, NDArray[np.int64]]()
+        self._apart_ns: int | None = None  # from the crank's header stamps to its log times
+        self._unstamped = [stream.topic for stream in streams_of(config) if not stream.has_stamp]
+        self._last_ns = dict[int, NDArray[np.int64]]()
         self._decoder = Decoder(config)
         bag_files, self._findings = bag.find_files(paths), list[Finding]()
         self._axis = WrenchAxis(config.drive_torque.axis)
@@ -401,9 +370,13 @@ class Recording:
                 self._note_clock_steps(block)
                 yield from self._pauses.cut(block)
         self._findings += self._joints.findings(self.files[0])
-        notes, other_axis = self._clocks.notes(), self._axis.report()
+        other_axis, apart_ns = self._axis.report(), self._apart_ns or 0
         self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
-        self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
+        for topic in self._unstamped:
+            if topic in self.topics and abs(apart_ns) > _FAR_NS:
+                text = f"{topic} has no header, so its stamps are log times; they are {apart_ns / 1e9:.6g} s"
+                text += " after the header stamps of joint_states; try --time log"
+                self._findings.append(Finding(self.files[0], text, Severity.NOTE))
 
     def _note_clock_steps(self, block: Block) -> None:
         cranks = (block.samples["kind"] == CRANK) & (block.samples["fault"] == NO_FAULT)
@@ -448,17 +421,14 @@ class Recording:
         if piece.samples is not None:  # a table has one clock only
             return self._decoder.scaled(piece.samples)
         samples = self._decoder.many(piece.data, piece.messages)
-        cranks = piece.messages["type"] == JOINT_STATE
-        self._findings += clock_steps(bag_file.path, piece.messages["log_time_ns"][cranks])[1]
+        kinds, good = piece.messages["type"], samples["fault"] == NO_FAULT
+        self._findings += clock_steps(bag_file.path, piece.messages["log_time_ns"][kinds == JOINT_STATE])[1]
         self._joints.add_samples(piece, samples)
-        wrenches = np.flatnonzero(
-            (piece.messages["type"] == WRENCH_STAMPED)
-            & (samples["kind"] == TORQUE)
-            & (samples["fault"] == NO_FAULT)
-        )
+        wrenches = np.flatnonzero(good & (kinds == WRENCH_STAMPED))
         some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
         self._axis.add(_raw(piece, one) for one in some)
-        self._clocks.compare(samples, piece.messages)
+        for first in np.flatnonzero(good & (kinds == JOINT_STATE))[:1] if self._apart_ns is None else ():
+            self._apart_ns = int(piece.messages["log_time_ns"][first] - samples["stamp_ns"][first])
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
             samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]

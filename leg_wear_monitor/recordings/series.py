@@ -165,8 +165,9 @@ def _continued(
     shifts_ns = [0]  # after each step, the same for all series, which thus keep their order
     for name, pieces in parts.items():
         if isinstance(name, JointName):
-            steps = (one for piece in pieces for one in clock_steps(path, piece[0])[1])
-            findings += [one for one in dict.fromkeys(steps) if one not in findings]
+            for step in (step for piece in pieces for step in clock_steps(path, piece[0])[1]):
+                fault = f"{step.text}, also for the log times. Record again with a steady clock"
+                raise RecordingError(str(path), "", fault)
         logged, stamps, values = map(np.concatenate, zip(*pieces, strict=True))
         order = np.argsort(logged, kind="stable")
         stamps, values = stamps[order], values[order]

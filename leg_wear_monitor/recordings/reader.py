@@ -26,6 +26,7 @@ from leg_wear_monitor.recordings.message_checks import (
 )
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, streams_of
 from leg_wear_monitor.twin import CRANK
+from leg_wear_monitor.twin.crank_motion import BACKWARD_JUMP_NS
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
@@ -35,7 +36,6 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
     Samples,
 )
-from leg_wear_monitor.twin.tracker_state import BACKWARD_JUMP_NS
 
 # Check that several files record one leg: the same topics, and the crank joint in their messages.
 

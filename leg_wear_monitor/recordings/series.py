@@ -24,8 +24,8 @@ from leg_wear_monitor.recordings.message_checks import interfaces_in, names_in, 
 from leg_wear_monitor.recordings.reader import clock_steps
 from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.twin import CRANK, KINDS, TORQUE
+from leg_wear_monitor.twin.crank_motion import BACKWARD_JUMP_NS
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
-from leg_wear_monitor.twin.tracker_state import BACKWARD_JUMP_NS
 
 # Identity of a series: each joint is a candidate for the crank, each torque for the drive torque.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import attrs
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.position import TURN
@@ -390,7 +391,8 @@ def _stamps(one: Stretch) -> Words | None:
     by_stamp = here - before - (after - before) * steps[:-1] / (steps[:-1] + steps[1:])
     by_number = here - 0.5 * (before + after)
     scatter_s = float(np.sqrt(np.mean(by_stamp**2) / 1.5)) / one.speed
-    is_of_arrival = np.mean(by_number**2) < 0.25 * np.mean(by_stamp**2)
+    # medians, because a few stamps may be out of order
+    is_of_arrival = np.median(by_number**2) < 0.25 * np.median(by_stamp**2)
     if not is_of_arrival or scatter_s < max(_SCATTERED * one.period_s, _SCATTERED_RAD / one.commanded):
         return None
     return {"size": amount(scatter_s, "s"), "percent": f"{100.0 * scatter_s / one.period_s:.0f}"}
@@ -412,29 +414,37 @@ def _frozen(one: Stretch) -> Words | None:
     return {} if enough and np.ptp(one.angle) < _STILL_RAD else None
 
 
+def _frozen_runs(torque: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+    """Ends of the runs of equal torques, and which of them last as long as those of a frozen sensor."""
+    ends = np.flatnonzero(np.append(np.diff(torque), 1.0)) + 1
+    return ends, np.diff(ends, prepend=0) >= max(_LEAST, _FROZEN * len(torque))
+
+
 def _constant(one: Stretch) -> Words | None:
     """All torques, or a part of them in a row."""
-    changes = np.flatnonzero(np.append(np.diff(one.torque), 1.0)) + 1
-    runs = np.diff(changes, prepend=0)
-    longest = int(np.argmax(runs))
-    if runs[longest] >= max(_LEAST, _FROZEN * len(one.torque)):
-        return {"size": amount(float(one.torque[changes[longest] - 1]), "N m")}
+    ends, is_frozen = _frozen_runs(one.torque)
+    if is_frozen.any():
+        return {"size": amount(float(one.torque[ends[is_frozen.argmax()] - 1]), "N m")}
     is_still = np.std(one.torque) <= _NO_VARIATION * one.size_nm
     return {"size": amount(float(np.mean(one.torque)), "N m")} if is_still else None
 
 
 def _saturated(one: Stretch) -> Words | None:
-    if np.std(one.torque) <= _NO_VARIATION * one.size_nm:
+    # a long run at the start or the end is of a sensor that was frozen before, or freezes
+    ends, is_frozen = _frozen_runs(one.torque)
+    first, last = is_frozen[0] * ends[0], ends[-2] if is_frozen[-1] and len(ends) > 1 else ends[-1]
+    torque = one.torque[first:last]
+    if len(torque) < _LEAST or np.std(torque) <= _NO_VARIATION * one.size_nm:
         return None
-    most = float(np.max(np.abs(one.torque)))
-    number = np.unique(one.torque, return_counts=True)[1]
+    most = float(np.max(np.abs(torque)))
+    number = np.unique(torque, return_counts=True)[1]
     # a torque of few digits repeats its extremes as well, but not so much more often than the next values
-    ends = [
+    at_ends = [
         int(end)
         for end, beside in ((number[0], number[1]), (number[-1], number[-2]))
         if end >= _BESIDE * beside
     ]
-    part = sum(ends) / len(one.torque)
+    part = sum(at_ends) / len(one.torque)
     if part < _AT_END:
         return None
     return {"size": amount(most, "N m"), "percent": f"{100.0 * part:.0f}"}
@@ -469,7 +479,8 @@ class InputRule:
     needs_motion: bool = True
 
 
-JUMP, SPIKES, NOT_OF_GAIT = "CRANK_JUMP", "TORQUE_SPIKES", "TORQUE_NOT_OF_GAIT"
+UNIT, HELD, JUMP = "CRANK_UNIT", "CRANK_HELD", "CRANK_JUMP"
+SPIKES, NOT_OF_GAIT = "TORQUE_SPIKES", "TORQUE_NOT_OF_GAIT"
 _NO_JOINT = "; no joint is observed"
 INPUT_RULES = (
     InputRule(
@@ -481,7 +492,7 @@ INPUT_RULES = (
         do="check the crank's encoder and its driver; if the leg stands under a changing load, let it walk",
     ),
     InputRule(
-        code="CRANK_UNIT",
+        code=UNIT,
         kind=CRANK,
         words=_unit,
         needs_motion=False,
@@ -498,7 +509,7 @@ INPUT_RULES = (
         do="let the driver stamp each sample when it is measured (header.stamp)",
     ),
     InputRule(
-        code="CRANK_HELD",
+        code=HELD,
         kind=CRANK,
         words=lambda one: _held(one.angle, one.crank_ns, one.speed),
         why=(
@@ -645,7 +656,9 @@ _AMONG = 5  # samples; two of them may be outliers
 _PERIODS = 4  # evaluation periods per stretch
 _KEPT_PERIODS = 12  # periods of kept samples: a gait cycle may be slower than commanded
 _AFTER = 3  # commanded gait cycles without a fault, after which it is over
-_SEEN_TWICE = (JUMP, NOT_OF_GAIT)  # outliers may come back a period later; one strange step is no fault
+# Judgements before the fault has a name: outliers may come back, and an angle that is held or in a wrong unit
+# looks like a jump for a gait cycle; one strange step is no fault.
+_NOT_YET = {JUMP: 5, NOT_OF_GAIT: 1}
 
 
 @attrs.define
@@ -706,7 +719,7 @@ class InputJudge:
         """Faults that are present, in the order of their rules."""
         found = self.state.faults
         shown = (found[rule.code] for rule in INPUT_RULES if rule.code in found)
-        return tuple(one for one in shown if one.shown > (one.code in _SEEN_TWICE))
+        return tuple(one for one in shown if one.shown > _NOT_YET.get(one.code, 0))
 
     @property
     def trusted_before_ns(self) -> Mapping[int, int]:
@@ -745,6 +758,9 @@ class InputJudge:
         state.now = ()
         cranks = of_crank(joined)
         self._look_for_jumps(cranks)
+        if {UNIT, HELD} & state.faults.keys():  # the steps of such angles look like jumps, at the end as well
+            state.jumped_rad = 0.0
+            state.faults = {code: one for code, one in state.faults.items() if code != JUMP}
         if state.jumped_rad and len(cranks):
             words, stamps = {"size": amount(state.jumped_rad, "rad")}, cranks["stamp_ns"]
             self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))

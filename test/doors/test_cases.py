@@ -201,6 +201,33 @@ def test_the_input_is_named_and_no_joint_is_accused(leg: lw.Mechanism, walk: Wal
     assert {alarm.kind for alarm in raised} <= {"input_torque", "input_samples", "input_gaps", "input_rate"}
 
 
+RECOVERS = ("zero", "frozen", "saturated", "arrival 2 ms", "held", "turns")
+ELEVEN_TURNS_NS = 11 * 10**9
+NO_FAULT = {"NO_GAIT_CYCLE", "TORQUE_NOT_COMPARED", "NONE"}
+
+
+@pytest.mark.parametrize("case", RECOVERS)
+def test_a_fault_that_begins_and_ends_is_named_alone(leg: lw.Mechanism, walk: Walk, case: str) -> None:
+    """The leg walks, its input fails for eleven turns, and the leg walks on."""
+    change, code = CASES[case]
+    config = lw.load_config(BAG.with_suffix(".yaml"))
+    config = attrs.evolve(config, diagnosis=attrs.evolve(config.diagnosis, enabled=False))
+    monitor = lw.WearMonitor(leg, config)
+    found: list[set[str]] = [set(), set(), set()]
+    for number, codes in enumerate(found):
+        samples = (change(walk) if number == 1 else walk).samples()
+        samples = samples[samples["stamp_ns"] < walk.crank_ns[0] + ELEVEN_TURNS_NS]
+        samples["stamp_ns"] += number * ELEVEN_TURNS_NS
+        for piece in np.array_split(samples, 44):
+            monitor.update(piece)
+            codes.add(monitor.verdict.verdict.fault_code)
+    before, during, after = found
+    assert before <= NO_FAULT
+    assert code in during <= NO_FAULT | {code}
+    assert after <= NO_FAULT | {code, "ALARM"}  # an alarm stays until it is acknowledged
+    assert monitor.verdict.verdict.fault_code in NO_FAULT | {"ALARM"}
+
+
 @pytest.mark.parametrize("share", [0.03, 0.045])
 def test_spikes_that_are_many_at_times_do_not_flicker(leg: lw.Mechanism, walk: Walk, share: float) -> None:
     """They are left out, or named until they are few; a torque that came is never missing."""

@@ -1,14 +1,27 @@
-"""Files of materials, and of drives: sources, units and their traps, and one line for a bad one."""
+"""Material pairs: their files, limits, and rating lives."""
 
 import math
 from pathlib import Path
 from typing import Any
 
+import attrs
 import pytest
+from mechanism_of import document_of, mechanism_of
 from ruamel.yaml import YAML
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.mechanism.materials import UNITS, Material, SourcedValue, WearCoefficient
+from leg_wear_monitor.mechanism.materials import (
+    UNITS,
+    Bushing,
+    BushingLoad,
+    Material,
+    SourcedValue,
+    WearCoefficient,
+    bushing_of,
+    rating_life_hours,
+)
+
+# Files of materials, and of drives: sources, units and their traps, and one line for a bad one.
 
 
 def wear(value: float, unit: str, hardness: SourcedValue | None = None) -> float:
@@ -155,3 +168,100 @@ def test_a_bad_file_is_one_line(tmp_path: Path, old: str, new: str, words: list[
 def test_an_unknown_name_is_one_line_with_a_similar_one() -> None:
     with pytest.raises(lw.ConfigError, match=r"no material of this name.*did you mean du-on-steel-dry"):
         lw.load_material("du-on-steel-dri")
+
+
+# p, v and p v of a joint against the limits of its material.
+
+
+SETTINGS = attrs.evolve(lw.load_mechanism().clearances["G"], material="du-on-steel-dry")
+
+
+def loaded(pressure: float, speed: float, product: float, material: str = "du-on-steel-dry") -> BushingLoad:
+    bushing = Bushing.of(attrs.evolve(SETTINGS, material=material))
+    return bushing.loaded(0.1 * pressure, pressure, speed, product)
+
+
+@pytest.mark.parametrize(
+    ("load", "beyond"),
+    [
+        ((139.0e6, 2.4, 1.7e6), None),
+        ((141.0e6, 2.4, 1.7e6), "p 1.41e+08 Pa above 1.4e+08"),
+        ((139.0e6, 2.6, 1.7e6), "v 2.6 m/s above 2.5"),
+        ((139.0e6, 2.4, 1.9e6), "p v 1.9e+06 Pa m/s above 1.8e+06"),
+        ((141.0e6, 2.6, 1.7e6), "p 1.41e+08 Pa above 1.4e+08, v 2.6 m/s above 2.5"),
+    ],
+)
+def test_what_is_beyond_the_limits_is_one_line(load: tuple[float, float, float], beyond: str | None) -> None:
+    wanted = beyond and f"outside the limits of du-on-steel-dry: {beyond}"
+    assert loaded(*load).outside_limits == wanted
+
+
+def test_the_fraction_is_that_of_the_value_nearest_its_limit() -> None:
+    assert loaded(70.0e6, 2.0, 1.5 * 1.8e6).fraction == pytest.approx(1.5)
+    assert loaded(70.0e6, 2.0, 0.1e6).fraction == pytest.approx(0.8)
+
+
+def test_without_limits_nothing_is_outside_and_there_is_no_fraction() -> None:
+    for material in ("", "steel-on-steel-greased-mild"):
+        load = loaded(1e12, 1e6, 1e15, material)
+        assert (load.outside_limits, load.fraction, load.compared) == (None, None, {})
+
+
+def test_one_that_gives_a_static_limit_only_is_held_to_it() -> None:
+    load = loaded(41.0e6, 0.0, 0.0, "iglidur-b-on-steel")
+    assert "p 4.1e+07 Pa above 4e+07" in (load.outside_limits or "")
+
+
+def test_the_load_follows_from_forces_and_rubbing() -> None:
+    """A diameter of 20 mm, 20 mm wide: 4e-4 m^2. 800 N in the mean that rub with 240 W slide by 0.3 m/s."""
+    load = Bushing.of(SETTINGS).load(800.0, 2000.0, 240.0)
+    assert load.mean_pressure_pa == pytest.approx(2.0e6)
+    assert load.p99_pressure_pa == pytest.approx(5.0e6)
+    assert load.mean_sliding_speed_mps == pytest.approx(0.3)
+    assert load.mean_pressure_speed_pa_mps == pytest.approx(0.6e6)
+    assert Bushing.of(SETTINGS).load(0.0, 0.0, 0.0).mean_sliding_speed_mps == 0.0
+
+
+# SKF's formula of the life of a bushing gives SKF's own example.
+
+
+def test_the_published_example() -> None:
+    """The door of a tramway: published 1.64 N/mm^2, 0.01 m/s and 22 500 h; 22 464 h by the formula."""
+    pair = lw.load_material("skf-ptfe-composite-on-steel")
+    assert pair.rating_life is not None
+    assert pair.limits.dynamic_pressure is not None
+    pressure = pair.limits.dynamic_pressure.si * 800.0 / 39_000.0
+    assert pressure == pytest.approx(1.64e6, rel=2.0e-3)
+    speed = 5.82e-7 * 20.0 * 90.0 * 10.0  # of 20 mm by 90 degrees, ten times a minute
+    assert pressure * speed < 0.025e6  # so the least p v stands for it
+    hours = 1.3 * 0.6 * 1.5 * rating_life_hours(pressure * speed, pair.rating_life)  # c1, c4, c5
+    assert hours == pytest.approx(22_464.0)
+    assert hours == pytest.approx(22_500.0, rel=2.0e-3)
+
+
+def test_the_constants_hold_for_their_range_only() -> None:
+    """GLYCODUR A: K_M 1900, n 1 up to 1 MPa m/s, at least 0.1 inserted."""
+    constants = lw.load_material("glycodur-a-on-steel").rating_life
+    assert constants is not None
+    hours = [rating_life_hours(1.0e6 * pv, constants) for pv in (0.05, 0.1, 0.5, 1.0)]
+    assert hours == pytest.approx([19_000.0, 19_000.0, 3800.0, 1900.0])
+    assert math.isnan(rating_life_hours(1.01e6, constants))
+
+
+def test_above_the_least_value_the_life_falls_with_p_v() -> None:
+    constants = lw.load_material("skf-ptfe-composite-on-steel").rating_life
+    assert constants is not None
+    one, two = (rating_life_hours(pv, constants) for pv in (0.1e6, 0.2e6))
+    assert one == pytest.approx(4800.0)
+    assert one / two == pytest.approx(2.0**constants.exponent.si)
+
+
+def test_joints_that_swing_have_limits_of_their_own() -> None:
+    """iglidur H: 196 ft/min where it turns, 137 ft/min where it swings; A and B are the crank's."""
+    document = document_of("bionic_leg")
+    document["clearances"]["defaults"]["material"] = "iglidur-h-on-steel"
+    limited = mechanism_of(document)
+    speeds = {joint: bushing_of(limited, joint).sliding_speed_mps for joint in limited.clearances}
+    assert speeds["G"] == pytest.approx(137 * 0.3048 / 60)
+    turning = {joint for joint in speeds if speeds[joint] == pytest.approx(196 * 0.3048 / 60)}
+    assert turning == {joint for joint in speeds if limited.drive.body in limited.sides(joint)} != set()

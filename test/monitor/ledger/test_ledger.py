@@ -5,8 +5,11 @@ import os
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -25,12 +28,14 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ClearancePoint,
     Commissioned,
     CorrectedClearance,
+    Entry,
     ForecastPoint,
     IdentifiedLeg,
     JointWear,
     Measurement,
     SimulatedReference,
     VerdictEvent,
+    WalkedLoad,
     binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import FORMAT, LedgerError, read
@@ -40,6 +45,62 @@ from leg_wear_monitor.twin.reference import POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.references import CYCLES, TorqueReference
 
 SECOND = 10**9
+
+
+@pytest.fixture(scope="session")
+def binding() -> Binding:
+    """What the test ledgers are of."""
+    return Binding(hardware_id="leg-7", mechanism="bionic_leg", fingerprint="00ff", joints=("A", "B"))
+
+
+@pytest.fixture(scope="session")
+def entry_at() -> Callable[[int], Entry]:
+    """An entry after so many seconds, other at every one."""
+
+    def entry(second: int) -> Entry:
+        depth = np.random.default_rng(second).random((2, 2, 720)) * 1.0e-6
+        return Entry(
+            stamp_ns=second * SECOND,
+            joints=tuple(
+                JointWear(name, depth[k], second, 0.9 * second, k) for k, name in enumerate(("A", "B"))
+            ),
+            totals={"cycles": float(second), "moving_s": 0.9 * second},
+            alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN, acknowledged=second % 2 == 1),),
+            spans=((0, second * SECOND, 0),),
+            loads=(WalkedLoad(300, second, 0.9 * second, 290.0, 8.0),),
+        )
+
+    return entry
+
+
+@pytest.fixture
+def open_ledger(tmp_path: Path, binding: Binding) -> Iterator[Callable[..., Ledger]]:
+    """Open the ledger of this test; whatever is open at its end is closed."""
+    opened = []
+
+    def open_(binding: Binding = binding, path: Path = tmp_path / "wear.ledger") -> Ledger:
+        ledger = Ledger(path, binding, interval_s=5.0)
+        opened.append(ledger)
+        return ledger
+
+    yield open_
+    for ledger in opened:
+        ledger.close()
+
+
+@pytest.fixture
+def reopened(open_ledger: Callable[..., Ledger], entry_at: Callable[[int], Entry]) -> Callable[..., Ledger]:
+    """The ledger of this test after a run that noted something, kept an entry and ended in order."""
+
+    def again(*notes: Any) -> Ledger:
+        ledger = open_ledger()
+        for note in notes:
+            ledger.note(note)
+        ledger.keep(entry_at(1), closed=True)
+        ledger.close()
+        return open_ledger()
+
+    return again
 
 
 def test_what_is_kept_is_there_again(open_ledger, entry_at):

@@ -1,4 +1,4 @@
-"""The verdict as a pure function: a list of cases, and laws over all alarms."""
+"""Rules of the verdict."""
 
 import math
 import re
@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor.alarms import (
-    ADVICE,
     EXCHANGED,
     SCALE,
     SIGN,
@@ -27,9 +26,31 @@ from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.input_health import INPUT_RULES, InputFault
 from leg_wear_monitor.monitor.verdict.rules import CONDITIONS, findings, sentence
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, KnownClearance, Situation
-from leg_wear_monitor.monitor.verdict.verdict import dated, guide_to, has_changed, rules, verdict_of
-from leg_wear_monitor.state import Figure, Level, State, Verdict
+from leg_wear_monitor.monitor.verdict.verdict import (
+    HOW_SURE,
+    dated,
+    decision_of,
+    figures_of,
+    guide_to,
+    has_changed,
+    rules,
+    table,
+    verdict_of,
+)
+from leg_wear_monitor.state import (
+    Figure,
+    FootLoad,
+    JointClearance,
+    LegState,
+    Level,
+    State,
+    TorqueDiagnosis,
+    Verdict,
+)
 from leg_wear_monitor.twin import CRANK, TORQUE
+
+# The verdict as a pure function: a list of cases, and laws over all alarms.
+
 
 JOINTS = ("A", "G")
 NEW = tuple(JointSituation(joint=joint, modelled_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
@@ -270,19 +291,6 @@ def test_every_rule_is_the_verdict_of_some_case() -> None:
     assert set(rules()) == set(CONDITIONS) == reached
 
 
-def test_a_mismatch_without_a_diagnosis_is_reported_as_what_it_is() -> None:
-    verdict = judged(
-        alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
-        torque_causes={"torque_bias": NamedCause(Cause.BIAS, -3.0, 0.1)},
-    )
-    assert "the drive torque does not fit the model of this leg, so the forecast is not valid" in verdict.why
-    assert "0.35 of the predicted RMS is not explained (limit 0.1)" in verdict.why
-    assert "possible cause: a constant torque of 3 N m ± 0.1 N m drives the crank" in verdict.why
-    assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
-    (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
-    assert (evidence.value, evidence.limit, verdict.since_ns) == (0.35, 0.1, 77)
-
-
 def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
     found = explained(Cause.SIGN, Cause.TIMING)
     verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
@@ -374,76 +382,12 @@ def test_a_joint_and_a_finding_about_timing_stand_together_the_joint_first() -> 
     assert "also: the drive torque differs from the prediction: its time does not fit" in verdict.why
 
 
-def test_several_joints_stand_together_with_their_clearances() -> None:
-    joints = tuple(
-        NamedCause(Cause.CLEARANCE, value, 3.0e-5, joint) for joint, value in (("A", 4e-4), ("G", 5e-4))
-    )
-    verdict = judged(diagnosis=diagnosis(change(Cause.SEVERAL, "A and G", joints=joints)))
-    assert (verdict.state, verdict.fault_code) == (State.INSPECT, "CLEARANCE_CHANGED_A_G")
-    assert "A 0.4 mm ± 0.03 mm and G 0.5 mm ± 0.03 mm" in verdict.why
-    unsure = change(Cause.SEVERAL, "A and G", joints=joints, runner_up="A and B", runner_up_log_odds=1.0)
-    assert "(or A and B)" in judged(diagnosis=diagnosis(unsure)).why
-
-
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
     fault = "the crank has not been tracked for 4 s"
     verdict = judged(joints=at_limit(), alarms=(alarm("clearance G"),), notes={"TRACKING_LOST": (fault,)})
     assert verdict.state is State.STOP
     assert verdict.why.endswith("the leg is not monitored now: the crank has not been tracked for 4 s")
     assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
-
-
-@pytest.mark.parametrize(
-    ("present", "value", "is_past"),
-    [(Level.OK, 3.0, True), (Level.WARN, 0.9, True), (Level.ERROR, math.nan, False)],
-    ids=["past", "warning", "of the ledger"],
-)
-def test_a_raised_alarm_is_reported_with_its_worst_value_and_whether_it_is_past(
-    present, value, is_past
-) -> None:
-    verdict = judged(alarms=(alarm("impact_force A", present=present, value=value, worst=1234.5),))
-    assert verdict.state is State.INSPECT
-    assert "is 1234 N" in verdict.why and "again now" not in verdict.why
-    assert ("(since 0.000 s; now within its limit)" in verdict.why) == is_past
-
-
-def test_an_alarm_is_reported_in_words_with_the_label_of_its_joint() -> None:
-    labelled = tuple(attrs.evolve(each, label="knee" if each.joint == "G" else "") for each in NEW)
-    impact = judged(alarms=(alarm("impact_force G"),), joints=labelled)
-    assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
-    assert "rock joint G (knee); " in impact.do and "leg-wear-monitor measure G MM" in impact.do
-    warning = judged(
-        alarms=(alarm("clearance G", Level.WARN, value=5e-4, worst=5e-4, limit=6e-4),), joints=labelled
-    )
-    assert warning.why == "the modelled clearance of joint G (knee) is 0.5 mm, near its limit of 0.6 mm"
-    samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
-    assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
-
-
-def test_an_alarm_without_a_noun_is_called_by_its_name() -> None:
-    own = attrs.evolve(alarm("torque_lag", Level.WARN), kind="input_odour", subject="torque")
-    assert judged(alarms=(own,)).why == "alarm: the input odour torque is 2 s (limit 1 s)"
-
-
-def test_no_sentence_of_a_verdict_has_a_code_name_of_an_alarm() -> None:
-    for name in BOARD.alarms:
-        for level in (Level.WARN, Level.ERROR):
-            assert name.partition(" ")[0] not in re.findall(r"\w+_\w+", judged(**raised(name, level)).why)
-
-
-def test_a_value_within_its_limit_by_less_than_the_deadband_is_reported_beside_the_worst_one() -> None:
-    verdict = judged(alarms=(alarm("torque_mismatch", value=0.0896, worst=0.219, limit=0.1),))
-    assert "0.219 of the predicted RMS is not explained (limit 0.1), 0.0896 now" in verdict.why
-    slow = judged(alarms=(alarm("input_rate torque", value=41.0, worst=7.0, limit=40.0),))
-    assert "is 7 Hz (limit 40 Hz)" in slow.why and ", 41 Hz now" in slow.why
-
-
-def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
-    off = judged(diagnosis=Diagnosis(reason="diagnosis.enabled is false"))
-    assert off.why.endswith("the torque is not compared with wider joints: diagnosis.enabled is false")
-    verdict = judged()
-    assert ADVICE in verdict.do
-    assert "3.1 % of its RMS is not explained (limit 10 %)" in verdict.why
 
 
 WAITING = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
@@ -541,28 +485,54 @@ def test_a_verdict_is_plain_data() -> None:
     assert record["not_valid"] == ["clearances", "growth", "impact_forces", "forecast"]
 
 
-def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
-    reason = "the leg is not that of its mechanism file"
-    unsure = attrs.evolve(diagnosis(change(Cause.CLEARANCE, "G")), reason=reason)
-    assert f"the change is 0.32 mm ± 0.03 mm); {reason}" in judged(diagnosis=unsure).why
-    at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
-    assert f"(limit 0.6 mm); {reason}" in at_limit.why
-    assert reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why
+# How sure, how soon, check, cost of an error: constants per code, and measured values where they hold.
 
 
-@pytest.mark.parametrize("now, then", [(-5.0, 41.4), (-5.0, math.nan), (math.nan, 41.4)])
-def test_a_friction_that_comes_with_another_temperature_says_both(now: float, then: float) -> None:
-    """Whoever finds it; and no other cause does."""
-    known = attrs.evolve(diagnosis(change(Cause.FRICTION, value=2.0)), temperature_c=now, commissioned_c=then)
-    alarmed = judged(
-        alarms=(alarm("torque_drift"),),
-        torque_causes={"torque_drift": NamedCause(Cause.FRICTION, 2.0, 0.1)},
-        diagnosis=attrs.evolve(known, changes=(), state=DiagnosisState.AS_MODELLED),
+def state(code: str, by: str = "torque", on_ground: bool = False, doubt: str = "") -> LegState:
+    joints = ("G",) if code != "NONE" else ()
+    verdict = Verdict(
+        state=State.INSPECT, joints=joints, why="", since_ns=0, do="", evidence=(), not_valid=(),
+        fault_code="_".join((code, *joints)),
+    )  # fmt: skip
+    return LegState(
+        verdict=verdict,
+        clearances={"G": JointClearance(best_estimate_source=by, modelled_m=3e-4, new_m=3e-4, limit_m=6e-4)},
+        load=FootLoad(source="estimated", peak_n=300.0) if on_ground else FootLoad(),
+        diagnosis=TorqueDiagnosis(state="as_modelled" if code == "NONE" else "changed", reason=doubt),
     )
-    words = " (the drive is at -5 °C, and was at 41 °C then)"
-    for verdict in (judged(diagnosis=known), alarmed):
-        assert verdict.fault_code == "FRICTION_CHANGED"
-        assert (words in verdict.why) == (not math.isnan(now + then))
-        assert ("°C" in verdict.why) == (words in verdict.why)
-    lag = attrs.evolve(known, changes=(change(Cause.LAG, value=0.01, sigma=0.001),))
-    assert "°C" not in judged(diagnosis=lag).why
+
+
+def test_every_rule_has_its_columns_and_every_measured_value_is_cited() -> None:
+    assert {name for rule in rules().values() for name in rule.measured} == set(table().measured)
+    for code in rules():
+        assert all(text for _, text in decision_of(state(code)))
+
+
+@pytest.mark.parametrize(
+    ("code", "conditions", "cited"),
+    [
+        ("CLEARANCE_CHANGED", {}, ("torque_name", "false_findings")),
+        ("CLEARANCE_CHANGED", {"doubt": "the model does not fit"}, ("false_findings",)),
+        ("CLEARANCE_CHANGED", {"on_ground": True}, ("torque_name_on_ground",)),
+        ("CLEARANCE_DETECTED", {}, ("torque_stop",)),
+        ("CLEARANCE_DETECTED", {"by": "encoders"}, ("encoder_name",)),
+        ("CLEARANCE_DETECTED", {"doubt": "the model does not fit"}, ()),
+        ("CLEARANCE_DETECTED", {"on_ground": True}, ()),
+        ("CLEARANCE", {"by": "modelled"}, ("life_interval",)),
+        ("CLEARANCE", {"by": "measured"}, ()),
+        ("NONE", {}, ("opened_found",)),
+        ("NONE", {"on_ground": True}, ("opened_found_on_ground",)),
+        ("MECHANISM_CHANGED", {}, ()),
+    ],
+)
+def test_a_measured_value_is_cited_only_for_a_leg_that_meets_its_conditions(code, conditions, cited) -> None:
+    leg = state(code, **conditions)
+    assert figures_of(leg) == tuple(table().measured[name] for name in cited)
+    assert (dict(decision_of(leg))[HOW_SURE] == table().how_sure["not_measured"]) == (
+        not cited and code != "CLEARANCE"
+    )
+
+
+def test_without_a_comparison_of_the_torque_no_opening_is_promised() -> None:
+    off = attrs.evolve(state("NONE"), diagnosis=TorqueDiagnosis(state="off"))
+    assert figures_of(off) == ()

@@ -5,9 +5,6 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor import ConfigError
-from leg_wear_monitor.mechanism.person import nominal_stance, with_toe_force
-from leg_wear_monitor.mechanism.position import build_linkage
 
 FEW = lw.LifeSettings(legs=2, cycles=3)
 ARRAYS = (
@@ -26,8 +23,7 @@ def begun(leg, settings=FEW, **options):
 @pytest.mark.parametrize("peak_n", [0.0, 300.0])
 def test_a_duty_of_one_load_is_the_life_under_it(leg, peak_n):
     """Bit for bit; under 0 N that of the leg as it is."""
-    force = peak_n * nominal_stance(build_linkage(leg)).force()
-    alone = begun(with_toe_force(leg, force) if peak_n else leg, clearances=("A", "G"))
+    alone = begun(lw.with_ground_reaction(leg, peak_n) if peak_n else leg, clearances=("A", "G"))
     found = begun(leg, clearances=("A", "G"), duty=lw.Duty({peak_n: 5.0}))
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(found, name), getattr(alone, name), err_msg=name)
@@ -113,16 +109,16 @@ def test_the_table_has_hours_days_and_the_growth_under_each_load(leg):
     ],
 )
 def test_a_duty_that_cannot_be_is_refused(text, fault):
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(lw.ConfigError) as error:
         lw.Duty.parse(text)
     assert str(error.value).startswith(f"duty: {fault}")
 
 
 def test_a_duty_has_a_load():
-    with pytest.raises(ConfigError, match=r"^duty: has no load"):
+    with pytest.raises(lw.ConfigError, match=r"^duty: has no load"):
         lw.Duty({})
 
 
 def test_a_leg_without_a_toe_has_no_duty():
-    with pytest.raises(ConfigError, match="has no point called toe for the ground to push"):
+    with pytest.raises(lw.ConfigError, match="has no point called toe for the ground to push"):
         lw.Duty({300.0: 1.0}).mechanisms(lw.load_mechanism("slider_crank"))

@@ -65,7 +65,9 @@ def test_a_healthy_leg_is_healthy(healthy, change, coulomb_nm: float) -> None:
         assert clearance.best_estimate_sigma_m >= 3.0e-5  # of a leg whose clearances nobody has measured
 
 
-@pytest.mark.parametrize(("joint", "opened_m"), [("A", 3.6e-4), ("B", 3.8e-4)])
+@pytest.mark.parametrize(
+    ("joint", "opened_m"), [pytest.param("A", 3.6e-4, marks=pytest.mark.slow), ("B", 3.8e-4)]
+)
 def test_a_joint_that_opens_while_the_baseline_is_taken_is_reported(
     torque_of, table, joint: str, opened_m: float
 ) -> None:
@@ -95,6 +97,7 @@ def late(walk: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {**walk, "drive_torque": np.interp(walk["time"] - 0.01, walk["time"], walk["drive_torque"])}
 
 
+@pytest.mark.slow  # a shorter walk below holds it for 20 ms
 def test_a_late_torque_accuses_no_joint(torque_of, table) -> None:
     verdict = lw.replay(late(table(torque_of(TAKEN), torque_of(TAKEN)))).summary().verdict
     assert (verdict.fault_code, verdict.joints) == ("TORQUE_TIMING", ())

@@ -31,6 +31,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -257,6 +258,18 @@ def test_two_legs_do_not_hear_each_other(scene: Scene) -> None:
                 values[status.hardware_id].append(rpm)
     rates = sorted(np.nanmedian([rpm for rpm in each if rpm > 0.0]) for each in values.values())
     assert rates == pytest.approx([50.0, 60.0], abs=1.0)
+
+
+def test_each_status_is_in_one_group_of_the_aggregator(scene: Scene) -> None:
+    """As diagnostic_aggregator reads config/diagnostics.yaml."""
+    text = (lw.share_directory() / "config" / "diagnostics.yaml").read_text()
+    analysers = YAML(typ="safe", pure=True).load(text)["analyzers"]["ros__parameters"]
+    parts = [one["contains"] for name, one in analysers.items() if name != "path"]
+    names = {status.name for array in scene.heard["/diagnostics"] for status in array.status}
+    names |= {"leg_wear_monitor: crank zero", "leg_wear_monitor: foot_load"}  # only with their parameters
+    assert {f"{side}/leg_wear_monitor: joint A" for side in CYCLES} <= names
+    for name in names:
+        assert sum(any(part in name for part in group) for group in parts) == 1, name
 
 
 def test_parameters_are_listed_and_set_and_wrong_ones_are_refused_in_one_line(scene: Scene) -> None:

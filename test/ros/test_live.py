@@ -9,16 +9,13 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 from raw_messages import messages_of
-from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor import replay
-from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.gait.config import (
     FootLoadSensorConfig,
     KnockConfig,
     LoadConfig,
-    PaceConfig,
     TransportConfig,
 )
 from leg_wear_monitor.monitor.config.parameters import config_from
@@ -105,39 +102,6 @@ def test_a_publisher_that_does_not_fit_is_reported(stage, walk) -> None:
     assert levels(heard[-1])["topics"] == 2
     assert not any("/drive_torque: /stage has" in line.message for line in heard[-1].status)  # it fits
     assert monitor.received == 0
-
-
-def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
-    slow = stage.walk(PublisherConfig(duration_s=3.0, pace=PaceConfig(speeds_rpm=(50.0,))))
-    left, right = stage.monitor("left"), stage.monitor("right", cadence__commanded_rpm=50.0)
-    stage.legs("/left").play(walk, left, end_s=3.0)
-    stage.legs("/right").play(slow, right)
-    speeds = [gait_of(one).values["cadence_rpm"] for one in (left, right)]
-    assert speeds == pytest.approx([60.0, 50.0], abs=1.0)
-    topics = {name for name, _ in stage.node.get_topic_names_and_types()}
-    assert {"/left/leg_wear_monitor/alarms", "/right/leg_wear_monitor/alarms"} <= topics
-    heard = stage.listen("/diagnostics", DiagnosticArray)
-    stage.wait_for(lambda: len({one.status[0].hardware_id for one in heard}) == 2, "statuses of both legs")
-    names = {
-        leg: {line.name for one in heard for line in one.status if line.hardware_id == leg} for leg in SIDES
-    }
-    assert not names["left"] & names["right"]
-    for leg in SIDES:
-        assert f"{leg}/leg_wear_monitor: joint A" in names[leg]
-        assert {len(groups_of(name)) for name in names[leg]} == {1}
-    assert groups_of("leg_wear_monitor: crank zero") == ["gait"]  # only with crank.zero: at_start
-    assert groups_of("leg_wear_monitor: foot_load") == ["gait"]  # only with foot_load.source
-
-
-SIDES = ("left", "right")
-
-
-def groups_of(status: str) -> list[str]:
-    """Analysers of config/diagnostics.yaml that take a status, as diagnostic_aggregator matches it."""
-    path = share_directory() / "config" / "diagnostics.yaml"
-    analysers = YAML(typ="safe", pure=True).load(path.read_text())["analyzers"]["ros__parameters"]
-    groups = {name: one for name, one in analysers.items() if name != "path"}
-    return [name for name, one in groups.items() if any(part in status for part in one["contains"])]
 
 
 def test_malformed_messages_are_counted_and_harm_nothing(stage) -> None:

@@ -17,7 +17,6 @@ from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.crank_motion import (
     EVALUATE,
     LEAVE,
-    LOST_BY_JUMP,
     LOST_BY_OUTLIERS,
     LOST_IN_GAP,
     MOVE,
@@ -90,32 +89,6 @@ def start_stop_reverse(t: np.ndarray) -> np.ndarray:
         t, [0.0, 0.2, 2.8, 3.0, 5.0, 5.2, 7.8, 8.0], TURN * np.array([0, 1, 1, 0, 0, -1, -1, 0])
     )
     return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
-
-
-@settings(max_examples=30)
-@given(cuts=st.lists(st.integers(0, 2000), max_size=40))
-def test_any_split_into_blocks_gives_the_same(gait, cuts):
-    samples = with_torque(gait(5.0, angle=start_stop_reverse))
-    assert_same(track(cut(samples, cuts)), track([samples]))
-
-
-def test_blocks_of_one_give_the_same(gait):
-    samples = with_torque(gait(3.0))
-    assert_same(track(cut(samples, range(len(samples)))), track([samples]))
-
-
-@settings(max_examples=30)
-@given(seed=st.integers(0, 2**32 - 1), late_s=st.floats(0.0, 0.0199), fraction=st.floats(0.0, 1.0))
-def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_s, fraction):
-    """Samples come up to 20 ms later than younger ones, some of them twice."""
-    samples, chance = with_torque(gait(3.0)), np.random.default_rng(seed)
-    twice = np.concatenate([samples, samples[chance.random(len(samples)) < fraction]])
-    arrival = twice["stamp_ns"] + 1.0e9 * late_s * chance.random(len(twice))
-    shuffled = twice[np.argsort(arrival, kind="stable")]
-    tracker = CrankTracker(TrackerSettings())
-    assert_same(track([shuffled], tracker), track([samples]))
-    assert tracker.state.counts.duplicates == len(twice) - len(samples)
-    assert tracker.state.counts.late == 0
 
 
 def assert_all_but_the_first_are_used(
@@ -264,33 +237,6 @@ def test_slow_samples_are_no_gaps(gait, rate_hz):
     assert tracker.state.counts.gaps_bridged == 0
 
 
-@given(shift_ns=st.integers(-START_NS + 1, 7_000_000_000_000_000_000))
-def test_the_motion_does_not_depend_on_when_it_is(gait, shift_ns):
-    """Bit for bit, from 1970 to 2240."""
-    samples = with_torque(gait(2.0))
-    moved = samples.copy()
-    moved["stamp_ns"] += shift_ns
-    here, there = track([samples]), track([moved])
-    np.testing.assert_array_equal(there.steps["motion"], here.steps["motion"])
-    np.testing.assert_array_equal(there.of(MOVE)["begin_ns"], here.of(MOVE)["begin_ns"] + shift_ns)
-
-
-def test_longer_gaps_are_not_made_up(gait):
-    """The crank is lost and found again; the time between, and to be sure of it, is unmonitored."""
-    samples = gait(6.0)
-    since = 1.0e-9 * (samples["stamp_ns"] - START_NS)
-    tracker = CrankTracker(TrackerSettings())
-    steps = track([samples[(since < 2.0) | (since >= 4.0)]], tracker)
-    assert len(steps.of(START)) == 2
-    assert list(steps.of(LEAVE)["detail"]) == [LOST_IN_GAP]
-    moves = steps.of(MOVE)
-    moved = (moves["end_ns"] - moves["begin_ns"]).sum()
-    first, last = steps.of(START)[0]["begin_ns"], moves[-1]["end_ns"]
-    unmonitored = tracker.state.counts.unmonitored_ns
-    assert moved + unmonitored - (first - START_NS) == last - first
-    assert unmonitored == pytest.approx(2.3 * S, abs=0.1 * S)
-
-
 def test_a_gap_of_the_crank_alone_is_one_too(gait):
     """Torque samples go on meanwhile: they are looked at without a leg."""
     samples = with_torque(gait(6.0))
@@ -301,16 +247,6 @@ def test_a_gap_of_the_crank_alone_is_one_too(gait):
     looked = steps.of(EVALUATE)
     assert (np.diff(looked["begin_ns"]) >= 0).all()
     assert ((looked["begin_ns"] > START_NS + 2.6 * S) & (looked["begin_ns"] < START_NS + 3.9 * S)).sum() > 200
-
-
-def test_stamps_that_jump_back_start_a_new_time_base(gait):
-    tracker = CrankTracker(TrackerSettings())
-    steps = track([gait(3.0), gait(3.0, start_ns=START_NS - 1000 * S)], tracker)
-    assert tracker.state.counts.backward_jumps == 1
-    assert list(steps.of(LEAVE)["detail"]) == [LOST_BY_JUMP]
-    assert len(steps.of(START)) == 2
-    assert tracker.state.counts.unmonitored_ns == pytest.approx(0.2 * S, abs=0.05 * S)
-    assert steps.of(MOVE)[-1]["end_ns"] > START_NS - 997.3 * S
 
 
 @settings(max_examples=30)

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import attrs
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.files import share_directory
+from leg_wear_monitor import share_directory
 
 FOXGLOVE, RVIZ, PLOTJUGGLER = "foxglove/leg.json", "rviz/leg.rviz", "plotjuggler/leg.xml"
 

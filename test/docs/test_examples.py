@@ -7,12 +7,11 @@ import runpy
 import sys
 from pathlib import Path
 
+import command_line
 import pytest
-from click.testing import CliRunner
 from matplotlib import pyplot
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.cli.main import cli
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -55,9 +54,9 @@ def test_the_table_of_examples_csv_has_the_verdict_of_its_leg(tmp_path, monkeypa
 def test_the_fleet_of_examples_fleet_needs_a_person_at_one_leg(tmp_path, monkeypatch, capsys):
     for module in ("mcap", "pandas"):
         pytest.importorskip(module)
-    command = ["fleet", "update", str(EXAMPLES / "fleet" / "fleet.yaml"), "--out", str(tmp_path)]
-    done = CliRunner().invoke(cli, [*command, "--workers", "1"])
-    assert done.exit_code == 0, done.output
+    command = ["fleet", "update", EXAMPLES / "fleet" / "fleet.yaml", "--out", tmp_path, "--workers", 1]
+    done = command_line.run(*command)
+    assert done.code == 0, done.err
     run_script(EXAMPLES / "fleet" / "worn.py", monkeypatch, str(tmp_path))
     worst, other = capsys.readouterr().out.splitlines()
     assert worst.startswith("right-07: stop CLEARANCE_DETECTED_G; G ") and other.startswith(

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import command_line
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from matplotlib import pyplot
-
-from leg_wear_monitor.cli.main import cli
 
 DOCS = Path(__file__).parents[2] / "docs"
 TUTORIALS = sorted(DOCS.glob("tutorials/*.py"))
@@ -34,7 +32,8 @@ def learnt(tmp_path, monkeypatch):
     def typed(command, cwd, **_):
         assert command[0] == "leg-wear-monitor"
         monkeypatch.chdir(cwd)
-        return SimpleNamespace(stdout=CliRunner().invoke(cli, command[1:]).output, stderr="")
+        done = command_line.run(*command[1:])
+        return SimpleNamespace(stdout=done.out + done.err, stderr="")
 
     def run(name):
         long, short = SHORTER[name]

@@ -1,4 +1,6 @@
-"""Signatures of gait cycles: laws that hold for any torque."""
+"""Signatures of clearances in the drive torque, and the fits behind them."""
+
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -6,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.estimate.body_torques import body_torques, torque_coefficients
 from leg_wear_monitor.estimate.drive import Channel
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.signature import (
     PhaseMeans,
     SimulatedSensor,
@@ -18,9 +22,13 @@ from leg_wear_monitor.estimate.signature import (
     simulated_signatures,
     without_scatter,
 )
-from leg_wear_monitor.mechanism.position import TURN
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, one_cycle
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.references import TorqueReference
+
+# Signatures of gait cycles: laws that hold for any torque.
+
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=10.0)
 ANGLE = 2.0 * np.pi * (np.arange(200) + 0.5) / 200
@@ -197,3 +205,104 @@ def test_a_large_change_stays_as_it_is() -> None:
     found, scatter = without_scatter(WIDER, measured, np.eye(160), OWN, COMMON)
     assert np.square(found - true).mean() < 1.05 * (OWN + COMMON).mean()
     np.testing.assert_allclose(scatter, OWN + COMMON, rtol=0.2)
+
+
+# What bodies change of the ideal leg's torque, held against the torque of changed legs.
+
+
+POINTS = 240
+
+
+@pytest.mark.parametrize("speed", [2.0 * np.pi, -5.0])
+@pytest.mark.parametrize(("kind", "step", "off"), [("mass", 0.5, 1e-9), ("length", 2.0e-3, 1e-6)])
+def test_they_are_differences_of_the_torques_of_other_legs(leg, speed, kind, step, off) -> None:
+    """The torque is linear in the masses, and that of lengths is a difference with the same step."""
+    none, k = LegParameters.none(leg), list(leg.bodies).index("shank")
+    more = attrs.evolve(none, **{kind: np.ones(len(leg.bodies)) + step * np.eye(len(leg.bodies))[k]})
+    torques = [
+        one_cycle(build_linkage(bodies.applied(leg)), POINTS, speed).drive_torque for bodies in (none, more)
+    ]
+    expected = (torques[1] - torques[0]) / step
+    found = body_torques(leg).at(speed)[kind == "length"][k]
+    np.testing.assert_allclose(found, expected, atol=off * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(2.0 * np.pi, 0.0), (-5.0, 3.0)])
+def test_their_sum_is_the_torque_of_the_leg(leg, speed, acceleration) -> None:
+    expected = one_cycle(build_linkage(leg), POINTS, speed, acceleration).drive_torque
+    found = np.array([1.0, speed, speed**2, acceleration]) @ body_torques(leg).own
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.usefixtures("solve_of_any_numpy")
+def test_they_are_solved_alike_by_the_oldest_numpy(leg) -> None:
+    """Seen before: with the numpy of Ubuntu 24.04 (1.26), each start of a monitor ended in a traceback."""
+    linkage = build_linkage(leg)
+    own, _ = torque_coefficients(linkage, ideal_motion(linkage, np.linspace(0.0, 6.0, 7), 1.0).q)
+    assert np.isfinite(own).all()
+
+
+# Laws of the solver: minima that are known, bounds, points that cannot be, and scatter.
+
+
+def rosenbrock(x: Floats) -> Point:
+    rest = np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+    return Point(rest, lambda: np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]))
+
+
+def linear(matrix: Floats, values: Floats) -> Callable[[Floats], Point]:
+    return lambda x: Point(matrix @ x - values, lambda: matrix)
+
+
+def test_a_curved_valley_is_followed_to_its_end() -> None:
+    found = gauss_newton(rosenbrock, np.array([-1.2, 1.0]))
+    np.testing.assert_allclose(found.x, 1.0, atol=1e-9)
+
+
+def test_a_linear_model_has_its_solution_and_covariance_after_one_step() -> None:
+    random = np.random.default_rng(5)
+    matrix, values = random.standard_normal((40, 3)) * [1.0, 1.0e3, 1.0e-3], random.standard_normal(40)
+    found = gauss_newton(linear(matrix, values), np.zeros(3))
+    np.testing.assert_allclose(found.x, np.linalg.lstsq(matrix, values, rcond=None)[0], rtol=1e-9)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(matrix.T @ matrix), rtol=1e-9)
+
+
+def test_bounds_hold_and_a_bounded_step_is_shorter() -> None:
+    at = linear(np.eye(2), np.array([5.0, -5.0]))
+    assert gauss_newton(at, np.zeros(2), low=-1.0, high=2.0).x.tolist() == [2.0, -1.0]
+    one = gauss_newton(at, np.zeros(2), longest=0.5, done=0.6)  # so the first step is the last
+    assert one.x.tolist() == [0.5, -0.5]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_least_square_in_a_box_is_found_where_columns_are_correlated(seed: int) -> None:
+    """By its law: downhill is inside only where it is out of the box."""
+    random = np.random.default_rng(seed)
+    matrix = random.standard_normal((40, 4)) @ (np.eye(4) + 0.9)
+    at = linear(matrix, matrix @ random.uniform(-2.0, 2.0, 4) + random.standard_normal(40))
+    found = gauss_newton(at, np.zeros(4), low=-1.0, high=1.0)
+    downhill = -matrix.T @ found.point.rest
+    inside = np.abs(found.x) < 1.0
+    np.testing.assert_allclose(downhill[inside], 0.0, atol=1e-5)
+    assert (downhill * found.x)[~inside].min(initial=0.0) >= 0.0
+
+
+def test_a_point_that_cannot_be_is_not_gone_to() -> None:
+    def at(x: Floats) -> Point:
+        return Point(np.array([x[0] - 3.0 if x[0] < 2.0 else np.inf]), lambda: np.eye(1))
+
+    assert 1.8 < gauss_newton(at, np.zeros(1)).x[0] < 2.0
+
+
+def test_columns_of_any_size_are_solved_for_several_values_at_once() -> None:
+    random = np.random.default_rng(6)
+    matrix = random.standard_normal((20, 3)) * [1.0e-4, 1.0, 1.0e4]
+    true = random.standard_normal((3, 2))
+    np.testing.assert_allclose(solved(matrix, matrix @ true), true, rtol=1e-6)
+    np.testing.assert_allclose(solved(matrix, matrix @ true[:, 0]), true[:, 0], rtol=1e-6)
+
+
+def test_leaving_out_parts_gives_the_scatter_of_a_mean() -> None:
+    values = np.random.default_rng(7).standard_normal(600)
+    (sigma,) = jackknife(lambda some: np.array([values[some].mean()]), len(values), 600)
+    assert sigma == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)), rel=1e-6)

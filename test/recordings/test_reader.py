@@ -1,19 +1,30 @@
-"""However messages were stored, the same samples come out, in order of log time."""
+"""Reading recordings: MCAP and SQLite, whole and damaged, within memory."""
 
+import os
+import shutil
+import sqlite3
+import struct
 from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import attrs
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from made_recordings import losses
 
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.recordings import encode
+from leg_wear_monitor.recordings import encode, findings
 from leg_wear_monitor.recordings.findings import RecordingError
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
+
+# However messages were stored, the same samples come out, in order of log time.
+
 
 Read = Callable[..., Any]
 
@@ -21,6 +32,11 @@ Read = Callable[..., Any]
 @pytest.fixture(scope="module")
 def sent(traffic):
     return traffic()
+
+
+@pytest.fixture(scope="module")
+def few(traffic):
+    return traffic(0.5)
 
 
 @pytest.mark.parametrize("compression", ["ZSTD", "LZ4", "NONE"])
@@ -243,3 +259,109 @@ def test_memory_stays_flat(tmp_path, write_bag, traffic):
     assert sum(sizes) == 16000
     assert max(sizes) < 5000
     assert list(fractions) == sorted(fractions) and fractions[-1] == 1.0
+
+
+# A .db3 file with all that was committed to it, whatever it is called and however it was left.
+
+
+@pytest.fixture
+def path(tmp_path, few, write_database):
+    """A closed database."""
+    return Path(shutil.copy(write_database(tmp_path / "bag", few), tmp_path / "x.db3"))
+
+
+def test_a_file_that_was_not_closed_is_a_loss_with_the_remedy(tmp_path, path, few, read):
+    """As a recorder leaves it that was killed."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        rows = database.execute("SELECT * FROM messages WHERE id > 20").fetchall()
+        database.execute("DELETE FROM messages WHERE id > 20")
+        database.execute("PRAGMA journal_mode = wal")
+        database.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+        for end in ("", "-wal"):
+            shutil.copy(f"{path}{end}", tmp_path / f"left.db3{end}")
+    _, recording = read(tmp_path / "left.db3")
+    (text,) = losses(recording)
+    assert text == ('was not closed: left.db3-wal is not read. Run: sqlite3 left.db3 "PRAGMA wal_checkpoint"')
+
+
+def test_without_an_index_of_time_the_order_is_the_same(path, few, expected, read):
+    with closing(sqlite3.connect(path)) as database, database:
+        query = "SELECT name FROM sqlite_master WHERE sql LIKE 'CREATE INDEX%'"
+        for (name,) in database.execute(query).fetchall():
+            database.execute(f"DROP INDEX {name}")
+    samples, _ = read(path)
+    assert samples.tobytes() == expected(few).tobytes()
+
+
+def test_a_complaint_that_is_no_text_is_one(path, read):
+    """SQLite repeats what it cannot understand, byte by byte."""
+    content = path.read_bytes()
+    assert b"CREATE TABLE messages(" in content
+    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CR\x89ATE TABLE messages("))
+    with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: ") as caught:
+        read(path)
+    assert str(caught.value).isprintable()
+
+
+# What a recording claims does not decide how much memory it gets; what it is not given is reported.
+
+
+BOMB_BYTES = 100_000_000
+
+
+def with_a_chunk(whole, data, compression, size, is_cut=False):
+    """A file without an index, and one chunk more at its end."""
+    content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))]
+    head = struct.pack("<QQQII", 0, 0, size, 0, len(compression)) + compression + struct.pack("<Q", len(data))
+    chunk = struct.pack("<BQ", 0x06, len(head) + len(data)) + head + data
+    end = struct.pack("<BQI", 0x0F, 4, 0) + struct.pack("<BQQQI", 0x02, 20, 0, 0, 0) + b"\x89MCAP0\r\n"
+    return content + (chunk[: len(chunk) * 9 // 10] if is_cut else chunk + end)
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+@pytest.mark.parametrize("claimed", [BOMB_BYTES, 1000])
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_that_grows_is_left_out_and_reported(
+    tmp_path, monkeypatch, few, write_bag, expected, read, compression, claimed, is_cut
+):
+    monkeypatch.setattr(findings, "MOST_BYTES", 8_000_000)
+    index_types = pytest.importorskip("mcap.writer").IndexType
+    whole = write_bag(tmp_path / "whole.mcap", few, index_types=index_types.NONE).read_bytes()
+    compress = zstandard.compress if compression == "zstd" else lz4.frame.compress
+    path = tmp_path / "bomb.mcap"
+    bomb = compress(bytes(BOMB_BYTES))
+    path.write_bytes(with_a_chunk(whole, bomb, compression.encode(), claimed, is_cut))
+    samples, recording = read(path)
+    assert samples.tobytes() == expected(few).tobytes()
+    assert recording.is_partial
+    if claimed == BOMB_BYTES and not is_cut:
+        texts = [str(finding) for finding in recording.findings]
+        assert any("needs 100 MB to be read. Expected at most 8 MB" in text for text in texts)
+
+
+def test_a_hole_that_claims_gigabytes_is_passed_over(tmp_path, few, write_bag, expected, read):
+    index_types = pytest.importorskip("mcap.writer").IndexType
+    whole = write_bag(tmp_path / "whole.mcap", few, index_types=index_types.NONE).read_bytes()
+    content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))] + struct.pack("<BQ", 0x05, 2**33)
+    path = tmp_path / "hole.mcap"
+    path.write_bytes(content)
+    os.truncate(path, len(content) + 2**33)
+    samples, recording = read(path)
+    assert samples.tobytes() == expected(few).tobytes()
+    assert any("is cut off or damaged at byte" in str(finding) for finding in recording.findings)
+
+
+@pytest.mark.parametrize(("name", "in_a_bag"), [("x.mcap", False), ("x.db3", False), ("x.mcap", True)])
+def test_a_pipe_is_refused_without_a_wait(tmp_path, read, name, in_a_bag):
+    home = tmp_path / "bag" if in_a_bag else tmp_path
+    home.mkdir(exist_ok=True)
+    os.mkfifo(home / name)
+    with pytest.raises(RecordingError, match=r"not a file\. Expected|contains no \.mcap or \.db3 file"):
+        read(home if in_a_bag else home / name)
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".mcap", "x\0y.mcap"])
+def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path, read, name):
+    with pytest.raises(RecordingError, match=r"cannot be read: |does not exist") as caught:
+        read(tmp_path / name)
+    assert str(caught.value).isprintable()

@@ -136,7 +136,7 @@ def extras_hinted() -> Iterator[None]:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name most similar to a given one, ignoring case; None if none is similar."""
-    import difflib  # not at the top, where it would delay the first moment at which Ctrl-C is answered
+    import difflib  # imported here, because an import at the top would delay the first reaction to Ctrl-C
 
     by_lower = {entry.lower(): entry for entry in known}
     near = difflib.get_close_matches(name.lower(), by_lower, n=1)
@@ -215,7 +215,7 @@ def leave(*_: object) -> None:
 
 
 def interrupt(_number: int, frame: FrameType | None) -> None:
-    """Handler of the first Ctrl-C: KeyboardInterrupt where it is not lost; else close all and leave."""
+    """Handler of the first Ctrl-C: raise KeyboardInterrupt, or clean up and exit where it may be lost."""
     if not exception_may_be_swallowed(frame):
         signal.signal(signal.SIGINT, _end_at_once)
         raise KeyboardInterrupt

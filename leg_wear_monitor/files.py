@@ -66,7 +66,7 @@ def unfinished(path: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        If the disk does not take it.
+        If the disk cannot be written.
     """
     remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -100,7 +100,7 @@ def remove_parts(directory: Path, names: str) -> None:
         Pattern of the names of the files.
     """
     for part in directory.glob(f".{names}.part"):
-        with suppress(OSError):  # in use by a process, or not removable: harmless
+        with suppress(OSError):  # in use by a process, or not removable, which is harmless
             if part.is_file() and not part.is_symlink():
                 with part.open("r+b") as file:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -148,7 +148,7 @@ def or_nan(value: float | None) -> float:
 
 
 def number_of(text: str | None) -> float:
-    """The number that a text of a table or a message is; NaN where it is none."""
+    """The number in a text of a table or a message; NaN if the text is not a number."""
     try:
         return float(text or "nan")
     except ValueError:
@@ -156,7 +156,7 @@ def number_of(text: str | None) -> float:
 
 
 def with_same_fields(kind: type[_Record], *of: object, **own: Any) -> _Record:
-    """A record of the attributes of other objects, the first one that has it, and of its own values."""
+    """A record with its own values, and with attributes from the first object that has them."""
     names = attrs.fields_dict(kind).keys() - own.keys()
     return kind(
         **own, **{name: getattr(next(one for one in of if hasattr(one, name)), name) for name in names}
@@ -186,7 +186,7 @@ def share_directory() -> Path:
     Raises
     ------
     ShareNotFoundError
-        If neither is there.
+        If neither exists.
     """
     package = Path(__file__).resolve().parent
     if (package.parent / "package.xml").is_file():
@@ -196,7 +196,7 @@ def share_directory() -> Path:
         if (share / "config").is_dir():
             return share
     raise ShareNotFoundError(
-        f"{package}: no share/{package.name}/config in a directory above; install with pip or colcon"
+        f"{package}: no share/{package.name}/config in any parent directory; install with pip or colcon"
     )
 
 

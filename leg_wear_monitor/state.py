@@ -37,8 +37,8 @@ class _Word(Enum):
 class State(_Word):
     """State of the leg, from the mildest to the most severe; the value is the word that files contain.
 
-    A leg that is not monitored is worse than one to be watched, and milder than one to be inspected: a reason
-    to inspect or to stop does not end because the input fails.
+    *Not monitored* is more severe than *watch* and milder than *inspect*, because a failing input must not
+    end a reason to inspect or to stop.
     """
 
     HEALTHY = "healthy"
@@ -403,7 +403,7 @@ class LegAlarms:
 
 @attrs.frozen(kw_only=True)
 class LegState:
-    """All that is known of a leg at one instant.
+    """All knowledge of a leg at one instant.
 
     Attributes
     ----------

@@ -77,7 +77,7 @@ def _sectors_at(n, angle):
 
 @kernel
 def _spline(n, w, before, here, after):
-    """Quadratic spline in a sector of n, and its derivatives; for numbers or vectors."""
+    """Quadratic spline in one of n sectors, and its derivatives; for numbers or vectors."""
     rest = 1.0 - w
     depth = 0.5 * (rest * rest * before + (1.0 + 2.0 * w * rest) * here + w * w * after)
     per_rad = n * _TURNS_PER_RAD
@@ -133,7 +133,7 @@ def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, tu
 
 @kernel
 def _beside(sector, side, n):
-    """The next of n sectors to one side (1 or -1); without a division, which takes longer than all else."""
+    """The next of n sectors on one side (1 or -1), without a division, which would take most of the time."""
     beside = sector + side
     if beside == n:
         return 0

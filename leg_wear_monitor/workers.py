@@ -23,7 +23,7 @@ from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, cl
 
 @cache
 def package_digest(*parts: str) -> str:
-    """Digest of the sources in files and folders of this package; of all without."""
+    """Digest of the sources in files and folders of this package; of the whole package by default."""
     home, digest = Path(__file__).parent, hashlib.sha256()
     for source in sorted(home.rglob("*.py")):
         path = source.relative_to(home)
@@ -45,7 +45,7 @@ WORKERS_S = 60.0  # time for a scheduler to get a worker
 
 
 def results(calls: Calls, workers: int = 1, scheduler: str | None = None) -> Iterator[tuple[str, Any]]:
-    """Names and results of calls, each as soon as it is there: the caller can store it at once.
+    """Names and results of calls, each as soon as it is complete, so that the caller can store it at once.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ def choice(name: str, names: Sequence[str], text: str, **of_click: Any) -> Optio
 
 
 def path_option(name: str, metavar: str, text: str, *, required: bool = False, **of_path: bool) -> Option:
-    """Option with a path, such as a file that has to exist."""
+    """Option with a path, for example to an existing file."""
     return option(name, metavar, text, type=click.Path(path_type=Path, **of_path), required=required)
 
 
@@ -97,12 +97,12 @@ mechanism_option: Option = option(
     "--mechanism", "FILE", "A mechanism file, or the name of one of the package.", default="bionic_leg"
 )
 clearances_option: Option = option(
-    "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: the mechanism's own]"
+    "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: as in the file]"
 )
 speed_option: Option = option(
     "--speed-rpm",
     "RPM",
-    "Crank speed [rpm], negative for clockwise.  [default: the mechanism's own]",
+    "Crank speed [rpm], negative for clockwise.  [default: as in the file]",
     type=float,
 )
 limit_option: Option = positive(
@@ -128,12 +128,12 @@ recordings_argument: Option = click.argument(
 
 def json_option(what: str) -> Option:
     """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
-    text = f"Write {what} as JSON; - writes it to stdout, and nothing else."
+    text = f"Write {what} as JSON; - writes only JSON, to stdout."
     return option("--json", "FILE", text, "json_file", type=click.Path(allow_dash=True, path_type=Path))
 
 
 def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
-    """The leg with the clearance joints of ``--clearances``, comma-separated names; as it is without names.
+    """The leg with the clearance joints of ``--clearances``, comma-separated; unchanged without names.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
     return attrs.evolve(leg, clearance_joints=joints)
 
 
-# Nodes: as verbs, which take ROS arguments, and as receivers of the operator's entries.
+# Nodes: as verbs with ROS arguments, and as receivers of the operator's entries.
 
 
 def need_rclpy() -> None:
@@ -194,7 +194,7 @@ _MOST_LINES = 20  # lines of findings on stderr
 
 
 def check_file(option: str, path: Path | None) -> None:
-    """Make sure that a file can be written, if one is asked for.
+    """Check that a requested file can be written.
 
     Raises
     ------
@@ -224,7 +224,7 @@ def check_directory(option: str, path: Path) -> None:
 
 
 def check_outputs(json_file: Path | None, out: Path | None) -> None:
-    """Make sure that the places of ``--json`` and ``--out`` can be written, as far as they are asked for.
+    """Check that the requested files of ``--json`` and ``--out`` can be written.
 
     Raises
     ------
@@ -323,7 +323,7 @@ def warn_of(source: str, found: Iterable["Doubt"]) -> None:
 
 @contextmanager
 def compilation() -> Iterator[None]:
-    """Say in a line, once, that the work inside compiles: only then does it take long.
+    """Report once that the work inside compiles, because only then does it take long.
 
     The line appears when the first function is compiled, so bad input also gives only one line.
     """

@@ -42,7 +42,7 @@ class Verbs(click.Group):
         """Import a verb's module and give its command."""
         file = _VERBS.get(cmd_name.replace("_", "-"))
         if file is None:
-            fault = f"{cmd_name!r} is not a verb. Expected one of {', '.join(_VERBS)}"
+            fault = f"{cmd_name!r} is not a command. Expected one of {', '.join(_VERBS)}"
             raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
         verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.verbs.{file}"), name)
@@ -128,7 +128,7 @@ def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) ->
 def cli(ctx: click.Context) -> None:
     """Monitor, simulate and forecast the joint wear of a crank-driven leg."""
     if ctx.invoked_subcommand is None:
-        raise click.UsageError(f"no verb. Expected one of {', '.join(_VERBS)}", ctx)
+        raise click.UsageError(f"no command. Expected one of {', '.join(_VERBS)}", ctx)
 
 
 def main(node: str | None = None) -> None:

@@ -39,7 +39,7 @@ def _leave_node(*_: object) -> None:
 
 
 def _start(node: str | None = None) -> None:
-    """Run the command line, or a node as a program of its own."""
+    """Run the command line, or a node as a separate program."""
     is_node = node is not None or (len(sys.argv) > 1 and sys.argv[1] in _NODES)
     try:
         if is_node:  # `ros.running.run` follows

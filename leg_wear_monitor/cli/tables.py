@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def plain_table(columns: Iterable[str], *left: int) -> Table:
     """A table without lines; the columns with these numbers, counted from 1, contain words.
 
-    If the table is too wide, words after the first column are folded, down to twelve characters.
+    If the table is too wide, the words after the first column wrap, down to twelve characters.
     """
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     for number, column in enumerate(columns, start=1):
@@ -38,7 +38,7 @@ def plain_table(columns: Iterable[str], *left: int) -> Table:
 
 
 def figure(value: float | None) -> str:
-    """Three significant digits, without exponent as far as that is readable; a dash for an unknown value."""
+    """Three significant digits, without exponent as long as that is readable; a dash for an unknown value."""
     if value is None:
         return "-"
     size = abs(value)
@@ -125,7 +125,7 @@ def print_replay(result: "ReplayResult", wall_s: float, files: Mapping[str, Path
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}; {result.crank_samples} crank "
         f"and {result.torque_samples} torque samples, {len(result.history)} gait cycles, "
-        f"{result.evidence.doubtful} of them unlike this leg"
+        f"{result.evidence.doubtful} of them not from this leg"
     )
     if words := walked_words(monitor.walked):
         console.print(words, soft_wrap=True)
@@ -157,9 +157,7 @@ def print_state(
     if state.clearances:
         console.print()
         console.print(_joints(state, joint_words))
-        console.print(
-            "life: remaining hours of walking, exceeded with a probability of 90 % (p10) and 50 % (p50)"
-        )
+        console.print("p10, p50: remaining hours of walking, exceeded with a probability of 90 % and 50 %")
     console.print()
     raised = [alarm for alarm in state.alarms.now if alarm.level]
     for alarm in raised:
@@ -176,8 +174,9 @@ def print_state(
 def _joints(state: "LegState", joint_words: Callable[[str], str]) -> Table:
     """Best estimate of each clearance, its limit, the remaining life, and the change since the baseline."""
     has_change = any(one.change_m is not None for one in state.clearances.values())
-    columns = ["\njoint", "clearance\nmm", "limit\nmm", "life p10\nh", "life p50\nh", "\nsource"]
+    columns = ["\njoint", "clearance\nmm", "limit\nmm", "p10\nh", "p50\nh", "\nsource"]
     table = plain_table([*columns, *(["change\nmm"] if has_change else [])], 1, 6)
+    table.collapse_padding = has_change  # otherwise 80 columns cut the last column off
     for joint, one in state.clearances.items():
         table.add_row(
             joint_words(joint),

@@ -141,7 +141,7 @@ def _found(
     crank_joint: str | None,
     model: TorqueModel,
 ) -> proposal.Found:
-    """The best choice of joint, torque and gear, and what its fit says."""
+    """The best choice of joint, torque and gear, and the quality of its fit."""
     motions = _cranks(signals.joints, crank_joint)
     found = candidates(motions, _torques(signals.torques), model)
     if not found:
@@ -171,7 +171,7 @@ def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointNa
     """Motions of the joints that turn on and on."""
     if wanted is not None and wanted not in {name.joint for name in joints}:
         known = ", ".join(sorted({name.joint for name in joints})) or "none"
-        raise LegWearError(f"--crank-joint: {wanted!r} is not a joint of the recording, it has {known}")
+        raise LegWearError(f"--crank-joint: {wanted!r} is not a joint of the recording, which has {known}")
     reasons, motions = [], {}
     for name, each in joints.items():
         if wanted not in (None, name.joint):
@@ -230,7 +230,7 @@ _LARGEST_RESIDUAL = 0.3  # torque residual of a healthy leg
 
 @attrs.frozen(eq=False)
 class _Walk:
-    """Gait cycles of a healthy leg at the commanded cadence: torque residuals, and how the crank turned.
+    """Gait cycles of a healthy leg at the commanded cadence: torque residuals and crank motion.
 
     ``faults`` are the faults of the input that the monitor reports, with their remedies.
     """
@@ -292,7 +292,7 @@ def _with_limit(result: CommissioningResult, walk: _Walk) -> CommissioningResult
     value = given if least <= given else math.ceil(100.0 * least) / 100.0
     seen = f"{usual:.2g} in {len(found)} gait cycles of this leg"
     if usual > max(_LARGEST_RESIDUAL, given):
-        why = f"{_LIMIT}: the torque differs from the model by {seen}, so a limit would hide a fault"
+        why = f"{_LIMIT}: the torque differs from the model by {seen}, so a limit would hide faults"
         return attrs.evolve(result, not_told=(*result.not_told, why), config=None)
     if value > max(_LARGEST_RESIDUAL, given):  # noise at a slow cadence, where the torque is small
         why = f"{_LIMIT}: the torque differs by {seen}, which hides smaller faults: walk faster"

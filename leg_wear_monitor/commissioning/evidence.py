@@ -31,16 +31,16 @@ def with_load(one: Fit, model: TorqueModel, terms: Terms) -> tuple[Fit, Terms]:
     return (loaded, with_it) if is_sure and explains and loaded.gain * one.gain > 0.0 else (one, terms)
 
 
-# Several speeds separate a lag of the torque from an offset of the crank; also the cadence.
+# Several speeds separate a lag of the torque from an offset of the crank. They also give the cadence.
 
 
-_SPEED_SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
+_SPEED_SPREAD = 0.15  # least relative spread of the speed that separates a lag from the offset
 _FILTERED = 0.25  # intervals late: behind a low-pass, instants look like averages, and are not late by a half
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _UNKNOWN_S = 0.0122  # RMS lag if nothing is measured: then the proposal allows for no lag
 _DECLARED_S = 0.001  # error of a declared lag
 _MARGIN = 1.5  # cadence tolerance over the observed departures
-_ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which the cadence is a different one
+_ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which a cadence counts as different
 
 
 def separates_lag(pair: Pair) -> bool:
@@ -55,7 +55,7 @@ def separates_lag(pair: Pair) -> bool:
 
 @attrs.frozen
 class Timing:
-    """When a torque is measured, as far as it is known.
+    """Timing of the measured torque, as far as it is known.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Timing:
 
     @property
     def is_separated(self) -> bool:
-        """True if the recording tells a lag from an offset."""
+        """True if the recording distinguishes a lag from an offset."""
         return math.isfinite(self.late_s)
 
 
@@ -104,7 +104,7 @@ def timing_of(one: Fit, sampling: str, is_sampling_known: bool, declared: DriveF
     if math.isfinite(declared.lag_s):
         lag_s, sigma_s = known_s + declared.lag_s, math.hypot(_DECLARED_S, sigma_s)
         return Timing(late_s, error_s, lag_s, sigma_s, True)
-    if math.isfinite(late_s):  # the whole lag is measured, whatever its parts
+    if math.isfinite(late_s):  # the measured lag is the sum of all its parts
         return Timing(late_s, error_s, max(0.0, one.lag_s), lag_error_s(one), False)
     return Timing(late_s, error_s, known_s, math.hypot(_UNKNOWN_S, sigma_s), False)
 
@@ -154,7 +154,7 @@ _CHUNKS = 12
 _AVERAGES_TO, _INSTANTS_FROM, _INSTANTS_TO = 0.04, 0.08, 3.0
 _SURE_SAMPLING = 2.0  # standard deviations of the recording
 _NOISE_ERROR = 0.25  # relative error of the noise's variance
-_HIDDEN = 0.5  # fraction of sensor noise in the residual's energy from which nothing is decided
+_HIDDEN = 0.5  # no decision if sensor noise is more than this fraction of the residual's energy
 _LARGE = 0.3  # fraction of the torque: impacts have 0.5 to 2; smaller ones do not drown slow errors of 0.02
 _ROUGH = 0.5  # energy of neighbours' steps over the energy of independent steps; 0.8 to 1.4 for impacts
 
@@ -168,11 +168,11 @@ def sampling_of(one: Fit, model: TorqueModel) -> tuple[str, str]:
     added, error = added_up(rest, noise, max(2, round(_WINDOW * turn)))
     is_rough = size > _HIDDEN * float(rest.var()) and steps > _ROUGH * size
     if not (is_large and is_rough and math.isfinite(added)):
-        return "", "averages and instants differ by impacts, and no strong impacts show above the noise"
+        return "", "only impacts tell averages from instantaneous values, and no impact is above the noise"
     low, high = added - _SURE_SAMPLING * error, added + _SURE_SAMPLING * error
     why = (
-        f"errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times as much as independent "
-        f"ones (averages: up to {_AVERAGES_TO:g}, instants: from {_INSTANTS_FROM:g} on)"
+        f"sums of neighbouring errors are {added:.2g} ± {error:.1g} times as large as for independent errors "
+        f"(averages: up to {_AVERAGES_TO:g}, instantaneous values: from {_INSTANTS_FROM:g} on)"
     )
     if 0.0 < high < _AVERAGES_TO:
         return AVERAGE, why
@@ -219,7 +219,7 @@ def _rest(one: Fit, model: TorqueModel) -> Floats:
     by = np.concatenate([still, still * (square / square.mean())])
     steady = is_steady(one.pair)
     by, rest = by[:, steady], rest[steady]
-    # columns are alike at one cadence; few of them, so that the normal equations save most of the time
+    # columns are similar at one cadence; they are few, so the normal equations save most of the time
     coefficients = np.linalg.pinv(by @ by.T, rcond=_SINGULAR, hermitian=True) @ (by @ rest)
     return np.asarray(rest - coefficients @ by)
 

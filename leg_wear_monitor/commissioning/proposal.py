@@ -1,4 +1,4 @@
-"""The proposed parameters with their intervals, and what a recording leaves open or contradicts."""
+"""The proposed parameters with their intervals, and the parameters that a recording does not determine."""
 
 import math
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ _AS_WELL = 1.02  # a fit is as good as the best fit up to this ratio of torque r
 # fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
 # to 0.45 with instants at 50 to 200 Hz (full coordinates, 60 rpm)
 _UNEXPLAINED = 0.7
-# factor on the errors of friction where the foot carries a load, whose course is not known exactly
+# factor on the errors of friction if the foot carries a load, because its shape is uncertain
 _UNDER_LOAD = 3.0
 
 
@@ -72,7 +72,7 @@ class Found:
         mismatch = self.fit.mismatch
         if mismatch < _UNEXPLAINED:
             return self.choice.doubts
-        sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit this leg, with any choice"
+        sentence = f"the torque: {100.0 * mismatch:.0f} % of its RMS does not fit, whatever the parameters"
         return (*self.choice.doubts, sentence)
 
     def friction(self, name: str) -> tuple[float, float]:
@@ -107,11 +107,11 @@ def found_of(choice: Choice, motion: JointMotion, model: TorqueModel, base: Moni
 _SURE = 3.0  # standard deviations
 _DRIFT_RAD = 0.05  # phase shift by clearances over a recording
 _LARGEST_DENOMINATOR = 20
-_BY_CHANCE = 0.1  # fractions that may lie within the error by chance
+_BY_CHANCE = 0.1  # number of fractions that may be within the error by chance
 
 
 def exact_ratio(measured: float, error: float) -> float | None:
-    """The simplest fraction within a relative error; None if there is none, or one would be by chance.
+    """The simplest fraction within a relative error; None if no fraction fits, or if a fit may be chance.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _gear_error(one: Fit) -> float:
 def offset_rad(found: Found, number: int) -> float:
     """Crank angle at joint position 0 of a recording, from -pi to pi."""
     one = found.fit
-    # the exact ratio instead of the measured one leaves the phase in the middle of the recording as it is
+    # with the exact ratio, the phase in the middle of the recording stays the same
     middle = float(np.median(one.pair.position_rad[one.pair.recording == number]))
     offset = one.offset_rad[number] + (one.ratio - one.direction / gear(found)[0]) * middle
     return float((offset + math.pi) % TURN - math.pi)
@@ -173,7 +173,7 @@ def _offset_sigma_rad(found: Found) -> float:
 # Parameters of the monitor from the chosen fit, each with its error and its runner-up.
 
 
-_NEAR = 0.05  # relative error by which clearances shift the scale: a given scale that near is kept
+_NEAR = 0.05  # relative error of the scale due to clearances; a given scale within this error is kept
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies for which a torque may be measured at the motor's shaft
 
 
@@ -188,7 +188,7 @@ def changes(found: list[Item]) -> dict[str, Any]:
 
 
 def _chosen(found: Found, name: str, **own: Any) -> Item:
-    """A choice among candidates, with the best one that differs in it."""
+    """A choice among candidates, with the best candidate that differs in this choice."""
     rival = found.choice.rivals.get(name)
     if rival:
         values = {
@@ -219,8 +219,8 @@ def _crank(found: Found) -> Iterator[Item]:
         value=round(offset_rad(found, max(one.offset_rad)), 4),
         unit="rad",
         sigma=_offset_sigma_rad(found),
-        remark="clearances shift the torque's phase"
-        + ("" if found.timing.is_separated else ", at one cadence a lag as well"),
+        remark="shifted by clearances"
+        + ("" if found.timing.is_separated else " and, at one cadence, by a lag"),
         mismatch=one.mismatch,
     )
 
@@ -240,13 +240,13 @@ def _torque(found: Found) -> Iterator[Item]:
         value=scale,
         sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), one.error.scale),
         mismatch=one.mismatch,
-        remark=f"scale times gear ratio measured {total:.4g}",
+        remark=f"measured scale times gear ratio: {total:.4g}",
     )
     yield Item(name="drive_torque.gear_ratio", value=turns)
     yield Item(
         name="drive_torque.sampling",
         value=found.sampling or found.base.drive_torque.sampling,
-        remark=found.why_sampling if found.sampling else "kept as given: not determined",
+        remark=found.why_sampling if found.sampling else "your value, because it was not determined",
     )
 
 
@@ -270,14 +270,14 @@ def _drive(found: Found) -> Iterator[Item]:
         value=timing.late_s,
         unit="s",
         sigma=timing.error_s if is_separated else None,
-        remark="in addition to the sampling" if is_separated else "at one cadence, it looks like an offset",
+        remark="in addition to the sampling" if is_separated else "at one cadence, part of the offset",
     )
     cadence, tolerance = cadence_rpm(one)
     yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")
     yield Item(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
     for name, unit, remark, given in (
-        ("friction", "N m", "constant, on the crank", declared.coulomb_nm),
-        ("load_friction", "", "as a fraction of the torque's size", declared.load_friction),
+        ("friction", "N m", "constant part, at the crank", declared.coulomb_nm),
+        ("load_friction", "", "part proportional to the torque", declared.load_friction),
     ):
         value, sigma = found.friction(name)
         known = f"; declared: {given:.4g} {unit}".rstrip() if math.isfinite(given) else ""
@@ -291,7 +291,7 @@ def _drive(found: Found) -> Iterator[Item]:
 
 
 _KNOWN_SIGMAS = 2.0  # standard deviations that must be below the requested accuracy
-_ANEW_RAD = 0.1  # offsets of two recordings of one absolute encoder differ by less
+_ANEW_RAD = 0.1  # largest difference between the offsets of two recordings with an absolute encoder
 _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating residual that may shift the scale more than twice as much as clearances
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque
@@ -330,8 +330,8 @@ def not_told(found: Found) -> Iterator[str]:
         yield f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer"
     elif rest > _ROUGH_REST:
         yield (
-            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit; the scale "
-            "may be wrong by as much"
+            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats but does not fit; the scale "
+            f"may be wrong by the same fraction"
         )
 
 
@@ -348,7 +348,7 @@ def findings(found: Found, mechanism: Mechanism) -> Iterator[str]:
         yield from _of_known_leg(found, mechanism)
     for unit, ratio in (("degrees", TURN / 360.0), ("turns", TURN)):
         if abs(one.gear_ratio * ratio - 1.0) < 2.0 * _gear_error(one):
-            yield f"the joint's position looks like {unit}; ROS expects radians: gear ratio {1.0 / ratio:.6g}"
+            yield f"the joint's position seems to be in {unit}, not in radians: gear ratio {1.0 / ratio:.6g}"
     if found.motion.is_wrapped and gear(found)[0] != 1.0:
         yield (
             f"the joint's position is wrapped to a turn, but its gear ratio is {one.gear_ratio:.6g}: the "
@@ -362,7 +362,7 @@ def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
     if rest > _NOTABLE_REST:
         yield (
             f"{100.0 * rest:.0f} % of the torque repeats with each turn and does not fit {mechanism.name}: "
-            "other masses or lengths, a spring, a load, or impacts that a sensor of instants does not average"
+            "other masses or lengths, a spring, a load, or impacts, if the sensor does not average"
         )
     friction, sigma = found.friction("friction")
     if friction < -_SURE * sigma and abs(friction) > _DRIVES * float(one.predicted.std() / abs(one.gain)):

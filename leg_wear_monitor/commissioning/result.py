@@ -47,8 +47,8 @@ def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
     return head + stream.getvalue()
 
 
-# The result: each parameter with its runner-up, the undetermined parameters, and the quantities that do not
-# fit.
+# The result: each parameter with its second-best value, the undetermined parameters, and the quantities that
+# do not fit.
 
 
 SCHEMA_VERSION = 1

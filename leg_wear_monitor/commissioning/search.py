@@ -72,7 +72,7 @@ def scan(pair: Pair, model: TorqueModel, count: int) -> list[Start]:
 
 
 def _lines(samples: int, reach: float, speed: float) -> NDArray[np.int64]:
-    """Indices in the spectrum of the ratios with enough turns, enough samples a turn, a credible speed."""
+    """Indices in the spectrum of ratios with enough turns, enough samples per turn, and a credible speed."""
     fastest = _FASTEST_RADPS / speed * reach / TURN
     most = min(samples / _LEAST_SAMPLES_PER_TURN, fastest)
     return np.arange(int(np.ceil(LEAST_TURNS * _FINE)), int(most * _FINE) + 1)
@@ -95,7 +95,7 @@ def _model_harmonics(model: TorqueModel, speed: Floats) -> NDArray[np.complex128
 
 
 def _peaks(value: Floats, count: int) -> list[int]:
-    """Indices of the largest local maxima, each apart from larger ones."""
+    """Indices of the largest local maxima, at a minimum distance from larger maxima."""
     left, peaks = value.copy(), []
     for _ in range(count):
         peak = int(left.argmax())
@@ -106,19 +106,19 @@ def _peaks(value: Floats, count: int) -> list[int]:
     return peaks
 
 
-# All joints, torques, directions and signs, each fitted; which of them are as good as the best.
+# The fits of all joints, torques, directions and signs, and the fits that are as good as the best.
 
 
 _PEAKS = 2  # ratios that are fitted, of each direction and sign
-_HOPELESS = 0.3  # fraction of the best explained fraction below which a pair gets only one fit
-_LEAST_PAIRS = 4  # so that there is a runner-up
-_ON_ONE_SHAFT_RAD = 0.005  # more than smoothed noise; the ripple of a gait that a wheel has not is larger
+_HOPELESS = 0.3  # pairs below this fraction of the best result get only one fit
+_LEAST_PAIRS = 4  # keep a second-best candidate
+_ON_ONE_SHAFT_RAD = 0.005  # above smoothed noise; the ripple of a gait is larger
 SAME_GEAR = 0.05
 
 
 @attrs.frozen(eq=False)
 class Candidate:
-    """A joint as the crank, a torque as its drive torque, and the fit of one with the other."""
+    """A joint as the crank, a torque as its drive torque, and the fit of both."""
 
     joint: JointName
     torque: TorqueSource
@@ -179,7 +179,7 @@ def same_gear(one: Fit, other: Fit) -> bool:
 # The best candidate, its rival in each respect, and whether the rival may be the truth.
 
 
-_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ only by their lags; sensors of two legs differ more
+_SAME_PHASE_RAD = 0.3  # two sensors of one torque differ only by their lags
 _SIGNALS = ("crank_joint", "drive_torque.source")
 _ANOTHER_LEG = 0.5  # repeating residual beyond which no known leg fits
 
@@ -238,7 +238,7 @@ def choose(found: list[Candidate]) -> Choice:
 
 
 def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
-    """Candidate with the least gear among joints on one shaft, which fit alike."""
+    """Candidate with the smallest gear ratio among joints on one shaft, which fit equally well."""
     best = found[0]
     near = [
         each
@@ -252,9 +252,9 @@ def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
 
 
 def _as_same(name: str, best: Candidate, rival: Candidate) -> str:
-    """Why an equally good rival means the same: a second encoder or sensor of the shaft; empty if not."""
+    """Why an equal candidate is equivalent: a second encoder or sensor of the shaft; otherwise empty."""
     if name == "crank_joint" and on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit):
-        return f"{rival.joint.joint} also turns with the crank, at {rival.fit.gear_ratio:.6g} turns a turn"
+        return f"{rival.joint.joint} also turns with the crank, at {rival.fit.gear_ratio:.6g} turns per turn"
     number = int(best.fit.pair.recording[0])
     if name != "drive_torque.source" or number not in rival.fit.offset_rad:
         return ""

@@ -1,4 +1,4 @@
-"""All that knows numba: kernels, their cache, vectors.
+"""All code that depends on numba: kernels, their cache, vectors.
 
 At its import and at each compilation, numba reads ``.numba_config.yaml`` of the current directory if PyYAML
 is installed. A key of this file runs code, so numba finds here neither PyYAML nor the file.

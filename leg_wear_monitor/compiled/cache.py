@@ -16,7 +16,7 @@ PACKAGE, VARIABLE = "leg_wear_monitor", "NUMBA_CACHE_DIR"
 
 
 def make_private(path: Path) -> str | None:
-    """Make a directory for this user alone, or take one that is there; say why it cannot be used.
+    """Create a directory for this user alone, or use an existing one; report why it cannot be used.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def kept_directories(place: Path) -> list[Path]:
 def one_process_at_a_time(path: Path) -> Iterator[None]:
     """Wait until no other process is inside with the same lock file; without lock support, do not wait.
 
-    A process that ends inside, however it does, lets the next one in.
+    A process that ends inside, even if it is killed, releases the lock.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def one_process_at_a_time(path: Path) -> Iterator[None]:
 
 @cache
 def _place() -> Path | None:
-    """The first of the usual places that can be used."""
+    """The first usable directory of the usual places."""
     faults: list[str] = []
     for variable, place in _usual_places():
         fault = make_private(place)

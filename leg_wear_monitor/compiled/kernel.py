@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.cache import PACKAGE, code_directory, one_process_at_a_time
 
-# numba's compiler, told to optimise an entry once and as a whole: all that is private in numba is here.
+# numba's compiler, changed to optimise an entry once as a whole; only this module uses private parts of
+# numba.
 #
 # By default, numba compiles every function as a separate program: it writes the wrappers that Python and C
 # would call, optimises it with all functions that it calls, and makes machine code of it. A chain of kernels
@@ -81,7 +82,7 @@ class _Part(_Library):  # type: ignore[misc]
     """Code of a kernel. It is only linked into an entry, so it is neither optimised nor compiled."""
 
     def finalize(self) -> None:
-        """Leave it as it was lowered; the kernels that it calls are linked next to it, not into it."""
+        """Keep the lowered code; the kernels that it calls are linked separately."""
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
@@ -129,7 +130,7 @@ class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
         self._part = _PartDispatcher(py_func, targetoptions=options, pipeline_class=_PartCompiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Compile the part for a call; a constant argument makes no other part, as it is inlined anyway."""
+        """Compile the part for a call; a constant argument needs no other part, because it is inlined."""
         general = {name: _unliteral(one) for name, one in kws.items()}
         return self._part.get_call_template([_unliteral(one) for one in args], general)
 
@@ -232,7 +233,7 @@ def store(entry: Any, directory: Path) -> None:
 
             def rebuild(self, context: Any, stored: Any) -> Any:
                 result = super().rebuild(context, stored)
-                # to be linked with it is an error, not an empty function
+                # linking with it must be an error, not an empty function
                 result.library._shared_module = None
                 return result
 
@@ -259,7 +260,7 @@ def store(entry: Any, directory: Path) -> None:
             _locator_classes = (_locators(in_package),)
 
         class CacheInPackage(FunctionCache):  # type: ignore[misc]
-            """Looks for code of the baseline, whatever this processor is called."""
+            """Looks for code of the baseline, independent of the name of this processor."""
 
             _impl_class = StoredInPackage
 

@@ -159,7 +159,7 @@ def bits(_context: Any, number: Any) -> Any:
 
 
 def of_bits(_context: Any, whole: Any) -> Any:
-    """The number with such bits."""
+    """The number with these bits."""
 
     def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         return builder.bitcast(values[0], NUMBER)
@@ -241,7 +241,7 @@ def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
 
 
 def _lower_binary(one: Any, template: Any, build: Callable[[Any, Any, Any], Any]) -> None:
-    """Tell numba the types and the code of an operator of a vector, and a vector or a number."""
+    """Register with numba the types and the code of an operator between a vector and a vector or a number."""
 
     def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         a, b = (as_vector(context, builder, *each) for each in zip(sig.args, values, strict=True))

@@ -166,7 +166,7 @@ def doubts(thing: Any, section: str = "") -> Iterator[Doubt]:
         if not (usual := field.metadata.get("usual")):
             continue
         value = getattr(thing, field.name)
-        if value == field.default:  # such as one that is not declared
+        if value == field.default:  # such as an undeclared key
             continue
         numbers = [one for one in (value if isinstance(value, tuple) else (value,)) if one is not None]
         beyond = [one for one in numbers if not usual[0] <= abs(one) <= usual[1]]
@@ -206,5 +206,5 @@ def part_document(part: Any) -> Any:
     if hasattr(part, "tolist"):  # an array, without the time to import numpy
         return part_document(part.tolist())
     if isinstance(part, Enum):
-        return part.name if isinstance(part, int) else part.value  # as configuration.strict reads them
+        return part.name if isinstance(part, int) else part.value  # types that configuration.strict reads
     return None if isinstance(part, float) and not math.isfinite(part) else part

@@ -44,7 +44,7 @@ def unknown_fault(what: str, name: str, known: Collection[str], listed: str) -> 
 # Strict conversion with cattrs: no conversion between numbers and texts, unknown keys are errors.
 
 
-MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
+MOST = 1.0e30  # bound in SI units, so that squares and ratios stay finite
 
 _Hook = Callable[[Any, Any], Any]
 _T = TypeVar("_T")
@@ -73,7 +73,7 @@ def structure_of_version(
     record = structure(record, dict[str, Any], source, "")
     found = record.get("schema_version", missing)
     if found != version:
-        fault = f"{reprlib.repr(found)} is not {version}, the version that this command reads; {again}"
+        fault = f"{reprlib.repr(found)} is not {version}, the only version that this command reads; {again}"
         raise ConfigError(source, "schema_version", fault)
     parts = {name: part for name, part in record.items() if name != "schema_version"}
     return structure(parts, kind, source, "")
@@ -114,7 +114,7 @@ def _part(step: str, value: Any, kind: Any) -> Any:
 
 
 def _field_error(error: BaseException) -> FieldError:
-    """The first fault; unknown keys come first, since they may explain missing ones."""
+    """The first fault; unknown keys come first, because they may explain missing keys."""
     if isinstance(error, FieldError):
         return error
     if isinstance(error, ForbiddenExtraKeysError):
@@ -176,7 +176,7 @@ def _text(value: Any, _kind: Any) -> str:
 
 
 def _member(value: Any, kind: type[Enum]) -> Enum:
-    """A member of an enumeration: of numbers by its name, of texts by its text."""
+    """A member of an enumeration: by its name if the values are numbers, by its text if they are texts."""
     members = {one.name if isinstance(one, int) else one.value: one for one in kind}
     if not isinstance(value, str) or value not in members:
         raise FieldError("", f"{shown(value)} is not one of {', '.join(map(repr, members))}")
@@ -194,7 +194,7 @@ def _strict_class(kind: type) -> _Hook:
 
     def hook(value: Any, _kind: Any) -> Any:
         given = mapping(value)
-        if flat:  # one attribute takes all remaining keys
+        if flat:  # a single attribute takes all remaining keys
             rest = {key: entry for key, entry in given.items() if key not in own}
             given = {key: entry for key, entry in given.items() if key in own} | {flat: rest}
         return inner(given, kind)
@@ -223,13 +223,13 @@ def _strict_tuple(kind: Any) -> _Hook:
 
 
 def _place(number: int, entry: Any) -> str:
-    """Name of a mapping in a list: its id if it has one, else the how many-th it is."""
+    """Name of a mapping in a list: its id, or its number if it has no id."""
     name = entry.get("id") if isinstance(entry, dict) else None
     return name if isinstance(name, str) and name and name.isprintable() else str(number)
 
 
 def _array(kind: Any) -> _Hook:
-    """A list of numbers as an array; null stands for NaN among those that are not whole."""
+    """A list of numbers as an array; in arrays of floats, null means NaN."""
     (number,) = get_args(get_args(kind)[1])
     is_whole = issubclass(number, np.integer)
 

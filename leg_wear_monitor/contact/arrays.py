@@ -50,7 +50,7 @@ _OF_FRICTION = {"friction": "law", "friction_coefficient": "coefficient"}
 def clearance_settings(
     mechanism: Mechanism, joints: Sequence[str], **options: float | str | None
 ) -> list[Clearance]:
-    """Settings of the clearance joints, with the same values for all of them in place of the mechanism's own.
+    """Settings of the clearance joints, with common values instead of those in the mechanism file.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
         returned = delivered_restitution(LAWS[law].hysteresis(restitution))
         warnings.warn(
             f"{source}: joint {', '.join(names)}: {law} asked for a restitution of {restitution:g} returns "
-            f"{returned:.3g}, it holds from {LEAST_RESTITUTION:g} on; try flores or hu-guo",
+            f"{returned:.3g}, the law is valid from {LEAST_RESTITUTION:g} on; try flores or hu-guo",
             ConfigWarning,
             stacklevel=3,
         )

@@ -123,9 +123,9 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
         f"({wide:.3g} mm wide in a radius of {1.0e3 * radius_m:.4g} mm)"
     )
     if is_winkler:
-        return f"{arc}, normal_law winkler holds up to {math.degrees(WIDEST_RAD):.0f} deg"
+        return f"{arc}. normal_law winkler is valid up to {math.degrees(WIDEST_RAD):.0f} deg"
     return (
-        f"{arc}, the law's force K delta^1.5 is for a narrow contact, up to about "
+        f"{arc}. The force K delta^1.5 of this law is for a narrow contact, up to about "
         f"{math.degrees(NARROW_RAD):.0f} deg; normal_law winkler is for a conformal one"
     )
 

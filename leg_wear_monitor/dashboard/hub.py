@@ -14,7 +14,7 @@ from leg_wear_monitor.dashboard.live_leg import LiveLeg
 MOST_VIEWERS = 100
 
 _TICK_S = 0.5  # no viewer sees more; each tick is one rendering for all viewers
-_TICKS_A_WORD = 2  # a word every second, also if nothing has changed: so a viewer knows that it is connected
+_TICKS_A_WORD = 2  # a word every second, even without a change, so that a viewer knows that it is connected
 
 
 @attrs.define(eq=False)
@@ -44,7 +44,7 @@ class Hub:
         self.is_closing = False
 
     def join(self) -> Viewer | None:
-        """A viewer more; None if there are too many."""
+        """Add a viewer; None if there are too many."""
         if len(self._viewers) >= MOST_VIEWERS or self.is_closing:
             return None
         viewer = Viewer()

@@ -1,4 +1,4 @@
-"""The page of a live leg: the sections of a replay's page, made of the state that a monitor publishes."""
+"""The page of a live leg: it shows the published state in the sections of a replay's page."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -134,12 +134,12 @@ def summary_of_now(
 
 @attrs.frozen
 class Freshness:
-    """How old the data are.
+    """Age of the data.
 
     Attributes
     ----------
     age_s : float or None
-        None before there are any.
+        None before the first data.
     silence : str
         The likely reason if no new data arrive, and the place to look.
     old_after_s : float
@@ -247,7 +247,7 @@ def leg_content(now: ReplaySummary, node: str, freshness: Freshness, instead: st
 
 
 def trends_markup(now: ReplaySummary) -> str:
-    """Charts of the joint that the reader chooses, and folded the charts of input and torque."""
+    """Charts of the joint that the reader chooses; the charts of input and torque are folded."""
     stamps = now.history.stamp_ns
     if len(stamps) < 2:
         return parts_markup([Text("There is nothing to draw yet.")])

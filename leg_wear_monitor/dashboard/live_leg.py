@@ -40,7 +40,7 @@ _CODE, _NO_DATA = "fault_code", "no_data_s"
 
 
 def received_status(name: str, level: int, message: str, values: Mapping[str, str]) -> ReplayStatus:
-    """A status from the parts of a message: its texts on one line and not too long, its values numbers."""
+    """A status from the parts of a message, with short texts on one line and numeric values."""
     first = islice(values.items(), MOST)
     return ReplayStatus(
         name=printable(name),
@@ -83,7 +83,7 @@ def received_state(text: str, source: str) -> LegState:
 
 
 def _clean(part: Any) -> Any:
-    """A part of a message with texts on one line, and with lists and objects that are not too long."""
+    """A part of a message, with texts on one line and bounded lists and objects."""
     if isinstance(part, dict):
         return {printable(name): _clean(value) for name, value in islice(part.items(), MOST)}
     if isinstance(part, list):
@@ -197,18 +197,18 @@ class LiveLeg:
         return Row(stamp_ns, leg, {**columns_m, "peak_force_n": self._peaks_n})
 
     def has_news(self) -> bool:
-        """True if the leg has received anything since the last content."""
+        """True if messages have come since the last content."""
         return self._is_new
 
     def content(self) -> Content:
-        """The page with everything that was received last."""
+        """The page with the last received values."""
         with self._lock:
             now, why_unknown = self._now(), self._fault or ("" if self._setup else self._why_unknown)
             self._is_new = False
         return leg_content(now, printable(self._node), self.freshness(), why_unknown, self._charts(now))
 
     def freshness(self) -> Freshness:
-        """Since when the monitor has sent no message; or, if it sends, since when it has no data."""
+        """Start of the time without messages, or, if the monitor sends messages, of the time without data."""
         with self._lock:
             arrived_s, leg_s = self._arrived_s, self._leg_silent_s
         if arrived_s is None:

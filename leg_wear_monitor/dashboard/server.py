@@ -19,8 +19,8 @@ from leg_wear_monitor.errors import LegWearError, printable
 
 MOST_CONNECTIONS = 300  # connections: the viewers of a hub, and further connections of their browsers
 
-_WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
-_IDLE_S = 20.0  # so is a connection without a whole request for so long; a browser just makes a new one
+_WRITE_S = 20.0  # a viewer that reads nothing for this time is disconnected
+_IDLE_S = 20.0  # a connection without a whole request for this time is closed; the browser opens a new one
 _REQUEST_BYTES = 16_384
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -40,7 +40,7 @@ class Place:
     Attributes
     ----------
     host : str
-        Name or address that it was bound to.
+        Name or address of the server.
     sockets : sequence of socket.socket
     """
 
@@ -64,7 +64,7 @@ def listen(host: str, port: int) -> Place:
     Raises
     ------
     LegWearError
-        If the port is in use or may not be bound, or the host is none of this machine.
+        If the port is in use or not allowed, or if the host is not an address of this machine.
     """
     try:
         return Place(host, [_bound(host, port)])
@@ -72,7 +72,7 @@ def listen(host: str, port: int) -> Place:
         raise LegWearError(f"--host: {printable(host)!r} is not a host: {error.strerror}") from error
     except PermissionError as error:
         raise LegWearError(
-            f"--port: {port} may not be used: {error.strerror}. Expected one above 1023"
+            f"--port: {port} may not be used: {error.strerror}. Expected a port above 1023"
         ) from error
     except OSError as error:
         reason = " ".join(str(error.strerror or error).split())
@@ -125,7 +125,7 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
 
 
 class _Server(HTTPServer):
-    """A server that hangs up on connections beyond a number, long before descriptors run out."""
+    """A server that closes surplus connections, long before file descriptors run out."""
 
     _open = 0
 
@@ -143,7 +143,7 @@ class _Server(HTTPServer):
 
 
 def application(hub: Hub, host: str) -> Application:
-    """The pages of a hub, for a server that is bound to a host."""
+    """The pages of a hub, for a server on a host."""
     common: dict[str, Any] = {"hub": hub, "host": host}
     return Application(
         [
@@ -157,7 +157,7 @@ def application(hub: Hub, host: str) -> Application:
 
 
 class _Reading(RequestHandler):
-    """Answers requests that use a name of this server, and only read."""
+    """Answers read requests that use a name of this server."""
 
     SUPPORTED_METHODS = ("GET", "HEAD")
 
@@ -177,11 +177,11 @@ class _Reading(RequestHandler):
 
     @property
     def _is_navigation(self) -> bool:
-        """True if a browser follows a link, in contrast to a page that reads data."""
+        """True if a browser follows a link; False if a script of a page reads data."""
         return self.request.headers.get("Sec-Fetch-Mode") == "navigate"
 
     def write_error(self, status_code: int, **_: Any) -> None:
-        """Answer with one line that contains nothing of the request."""
+        """Answer with one line that repeats nothing from the request."""
         if status_code == HTTPStatus.METHOD_NOT_ALLOWED:
             self.set_header("Allow", ", ".join(self.SUPPORTED_METHODS))
         self.set_header("Content-Type", "text/plain; charset=utf-8")

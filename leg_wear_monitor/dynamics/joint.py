@@ -30,8 +30,8 @@ CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just beg
 NEVER = 2.0
 
 _CLOSE = 1.0e-14  # tolerance of a crossing, as a fraction of the step
-# Fraction of a joint's largest force so far; a maximum above it counts as large. With all maxima, the largest
-# reactions of the default leg's ideal joints are the same.
+# A maximum counts as large above this fraction of a joint's largest force so far. With all maxima, the
+# largest reactions of the default leg are the same.
 _LARGE = 0.25
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @attrs.frozen
 class TorqueResult:
-    """Drive torque [N m] over the counted cycles.
+    """Drive torque [N m] over the evaluated cycles.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class TorqueResult:
 
 @attrs.frozen
 class EnergyBalance:
-    """Energy balance over the counted cycles [J].
+    """Energy balance over the evaluated cycles [J].
 
     Attributes
     ----------
@@ -379,7 +379,7 @@ SCHEMA_VERSION = 1
 
 @attrs.frozen(eq=False, repr=False)
 class SimulationResult:
-    """Result of `simulate` over the counted cycles.
+    """Result of `simulate` over the evaluated cycles.
 
     Attributes
     ----------
@@ -390,7 +390,7 @@ class SimulationResult:
     speed_rpm : float
         Mean crank speed, negative for clockwise.
     cycles : float
-        Number of counted gait cycles.
+        Number of evaluated gait cycles.
     simulated_s : float
         Simulated time [s], skipped cycles included.
     drive_torque_nm : TorqueResult
@@ -404,7 +404,7 @@ class SimulationResult:
     impacts : dict of str to tuple of Impact
         The first thousand impacts of each clearance joint.
     trace : Trace or None
-        Samples over the counted cycles; None if no trace was requested.
+        Samples over the evaluated cycles; None if no trace was requested.
     standard_error : dict of str to float, or None
         Standard error of a value by its path, such as ``joints.A.mean_force_n``: the standard deviation
         between gait cycles, divided by the root of their number, as if successive cycles were independent.

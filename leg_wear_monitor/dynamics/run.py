@@ -101,9 +101,9 @@ _DIGITS_AFTER_BIN, _BITS_OF_FIRST = 52 - 7, (1023 + _FIRST_OCTAVE) * _IN_OCTAVE
 
 
 class RunStatistics(NamedTuple):
-    """Statistics over the counted time, for j joints and the drive.
+    """Statistics over the evaluated time, for j joints and the drive.
 
-    ``time`` (1,) [s]: counted time; ``integral`` (j, 6), ``drive_integral`` (3,): columns and units above;
+    ``time`` (1,) [s]: evaluated time; ``integral`` (j, 6), ``drive_integral`` (3,): columns and units above;
     ``peak`` (j,) [N]: largest force; ``drive_range`` (2,) [N m]: least and largest torque;
     ``force_time`` (j, bins), ``torque_time`` (2, bins) [s]: time at each magnitude, of negative and positive
     torque; ``impact`` (j, 1000, 4): columns above; ``impacts`` (j,): number of impacts;

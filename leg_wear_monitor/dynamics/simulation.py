@@ -50,7 +50,7 @@ from leg_wear_monitor.mechanism.position import (
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 from leg_wear_monitor.wear import fresh_surfaces
 
-# Checks of the arguments of library functions; an invalid one raises an error of one line.
+# Checks of the arguments of library functions; an invalid argument raises a one-line error.
 
 
 _KINDS: dict[str, tuple[Any, str]] = {
@@ -172,7 +172,7 @@ def ideal_result(setup: Setup, cycles: float, trace: int, begin: float = 0.0) ->
 
 
 def _passed(cycles: float, begin: float, speed: float, points: int) -> Ints:
-    """Points of a turn that a crank passes in a number of cycles from an angle on, in turns; continuous."""
+    """Points of a turn that the crank passes from an angle on, in a number of cycles [turns, continuous]."""
     passed = np.arange(max(1, round(cycles * points)))
     return np.asarray(round(begin * points) % points + (passed if speed > 0.0 else -passed))
 
@@ -386,7 +386,9 @@ def _refuse(options: Mapping[str, object]) -> None:
 
 def _check_intervals(intervals: int | None, model: str, trace: int) -> None:
     if model == "clearance" and trace > (intervals or INTERVALS):
-        fault = f"{trace} points a cycle are more than the {intervals or INTERVALS} intervals. Expected fewer"
+        fault = (
+            f"{trace} points per cycle are more than the {intervals or INTERVALS} intervals. Expected fewer"
+        )
         raise ConfigError("trace", "", f"{fault}, or more intervals")
     if intervals is None:
         return
@@ -415,9 +417,9 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
 def _spans(
     setup: Setup, cycles: float, duration_s: float | None, skip_cycles: float | None, trace: int
 ) -> tuple[float, float]:
-    """Skipped time and counted time [s]."""
+    """Skipped time and evaluated time [s]."""
     if trace < 0:
-        raise ConfigError("trace", "", f"{trace} is below 0 points a cycle")
+        raise ConfigError("trace", "", f"{trace} is below 0 points per cycle")
     skip = skip_cycles if skip_cycles is not None else (1.0 if duration_s is None else 0.0)
     if not (math.isfinite(skip) and skip >= 0.0):
         raise ConfigError("skip-cycles", "", f"{skip:g} is not a finite number of cycles from 0 up")
@@ -496,7 +498,7 @@ def _run(
 
 
 def _turned(source: str, angles: Floats) -> float:
-    """Net turns of a crank from its angles (n,) [turns]; warns of one that swings."""
+    """Net turns of a crank from its angles (n,) [turns]; warns if the crank swings."""
     turned, path = float(angles[-1] - angles[0]), float(np.abs(np.diff(angles)).sum())
     if path > _MOST_PATH * abs(turned) + _ROUNDING:
         fault = (

@@ -46,7 +46,7 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
 
 def drive_torque(statistics: RunStatistics) -> TorqueResult:
-    """Drive torque over the counted time."""
+    """Drive torque over the evaluated time."""
     mean, square = statistics.drive_integral[[TORQUE, TORQUE_SQUARED]] / statistics.time[0]
     return TorqueResult(
         mean=float(mean),
@@ -65,7 +65,7 @@ def toe_errors(statistics: RunStatistics) -> ToeResult:
 
 
 def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> EnergyBalance:
-    """Energy balance over the counted time, from the stored energy [J] at its start and end."""
+    """Energy balance over the evaluated time, from the stored energy [J] at its start and end."""
     work = float(statistics.drive_integral[POWER])
     friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
     wear = float(statistics.worn_energy[0])
@@ -120,7 +120,7 @@ class CycleScatter:
     ----------
     setup : Setup
     statistics : RunStatistics
-        Statistics of the counted time, empty.
+        Statistics of the evaluated time, empty.
     stored : float, J
         Stored energy now.
     """
@@ -193,7 +193,7 @@ def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
 def joint_statistics(
     setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
 ) -> dict[str, JointResult]:
-    """Results of all joints by name; ``worn`` (k, 2, N) [m] is the wear depth of the counted cycles."""
+    """Results of all joints by name; ``worn`` (k, 2, N) [m] is the wear depth of the evaluated cycles."""
     found = _mean_loads(setup, statistics, worn, cycles)
     for k, name in enumerate(setup.clearance_joints):
         psi, doubt = _contact(setup, k, found[name].p99_force_n)
@@ -209,7 +209,7 @@ def joint_statistics(
 
 
 def _within_turn(zone: tuple[float, float] | None) -> tuple[float, float] | None:
-    """The zone with both angles from 0 to 360 [deg]; ``to`` is the smaller one if the zone crosses 0."""
+    """The zone with both angles from 0 to 360 [deg]; ``to`` is the smaller angle if the zone crosses 0."""
     if zone is None or zone[1] <= 360.0:
         return zone
     return zone[0], zone[1] - 360.0

@@ -17,7 +17,7 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 SURE_OF_NAME = 10.0
 # multiple of the modelled clearance: smaller openings get wrong names if masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
-SURE_SIGMAS = 2.0  # a clearance is surely beyond or below its limit by so many standard deviations
+SURE_SIGMAS = 2.0  # a clearance is surely above or below its limit by this number of standard deviations
 
 
 class Cause(Enum):
@@ -41,7 +41,8 @@ class Cause(Enum):
     SEVERAL = "clearances of several joints", "CLEARANCE_CHANGED"
     SIGN = "sign of the torque sensor", "TORQUE_SIGN"
     SCALE = "scale of the torque sensor", "TORQUE_SCALE"
-    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
+    # at one speed, the two cannot be distinguished
+    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"
     LAG = "lag of the torque sensor", "TORQUE_TIMING"
     NOISE = "noise of the torque sensor", "TORQUE_NOISE"
     BIAS = "zero of the torque sensor", "TORQUE_BIAS"
@@ -167,7 +168,7 @@ class TorqueExplanation:
 
     @property
     def named(self) -> tuple[NamedCause, ...]:
-        """The causes, if they are the only ones that fit and explain most of the torque residual."""
+        """The causes, if no other causes fit and they explain most of the torque residual."""
         # a smaller fraction is part of an unknown cause
         sure = len(self.alternatives) == 1 and (self.is_whole or self.after <= 0.25 * self.before)
         return self.alternatives[0] if sure else ()
@@ -179,7 +180,7 @@ class TorqueExplanation:
 
     @property
     def hides_leg(self) -> bool:
-        """True if the received torque tells nothing about the leg.
+        """True if the received torque contains no information about the leg.
 
         A delay or an offset of the crank does not hide it, because the diagnosis estimates them with the leg.
         """
@@ -187,7 +188,7 @@ class TorqueExplanation:
 
     @property
     def _possible(self) -> tuple[tuple[NamedCause, ...], ...]:
-        """The alternatives; without the rest that they leave, only the sure one."""
+        """The alternatives; if they explain everything, only the certain alternative."""
         return self.alternatives if self.is_whole else (self.named,)
 
     def _is_timing(self, causes: tuple[NamedCause, ...]) -> bool:

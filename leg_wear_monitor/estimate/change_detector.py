@@ -44,7 +44,7 @@ def excess(scatter: Floats) -> Floats:
     pairs = len(scatter) // 2
     if not pairs:
         return np.ones(scatter.shape[1])
-    # means of two: neighbouring cycles are correlated
+    # means of two cycles, because neighbouring cycles are correlated
     means = scatter[: 2 * pairs].reshape(pairs, 2, -1).mean(axis=1)
     return np.asarray(np.maximum(1.0, 2.0 * np.square(means).mean(axis=0)))
 
@@ -81,7 +81,7 @@ class ChangeDetector:
             changes += [model.at(opened(modelled_m, k, size))[0] - expected for size in sizes]
         self._of_joints = len(changes)
         changes += [each for one in (model.masses, model.friction) for each in one.change[one.grid != 1.0]]
-        # for a leg that shows as much less of an opening as the model may be off
+        # for a leg whose response to a larger clearance is weaker by the model's error
         change = (1.0 - MODEL_ERROR) * np.array(changes)
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T
         self._expected = expected + explainer.baseline.offset

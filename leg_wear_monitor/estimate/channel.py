@@ -37,7 +37,7 @@ from leg_wear_monitor.twin.references import TorqueReference
 # tried delays, and low-passes of 100 to 10 Hz
 _DELAYS_S = np.linspace(LEAST_DELAY_S, MOST_DELAY_S, 13)
 _TIME_CONSTANTS_S = (0.0, *(1.0 / (TURN * hz) for hz in (100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 14.0, 10.0)))
-_STEP_S = 0.0025  # to both sides of the best of these delays
+_STEP_S = 0.0025  # search range on both sides of the best delay
 # The search starts at the best of them. For each free value: bounds, the difference for a derivative, the
 # longest step, and the step that ends the search.
 _RANGES = {
@@ -70,7 +70,7 @@ _DECLARED_FRICTION_SIGMA = 0.03  # standard deviation of a declared load frictio
 # instead.
 _MEAN_SIGMA, _ROUGHNESS_SIGMA, _CLEARANCE_SIGMA = 0.05, 0.4, math.log(1.25)
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.1, Cause.LOAD: 20.0}
-_SPREAD_FACTOR = 5.0  # times `Nuisance.spread`, the usual change of a known leg, where this is larger
+_SPREAD_FACTOR = 5.0  # factor on `Nuisance.spread`, the usual change of a known leg, if this is larger
 # number of these harmonics, and their standard deviation: far above the torque of a leg
 _HARMONICS, _HARMONIC_NM = 16, 100.0
 
@@ -134,7 +134,7 @@ def channel_of(
     nuisances: Sequence[Nuisance],
     figures: DriveFigures = UNDECLARED,
 ) -> ChannelFit:
-    """The channel of a sensor whose noise is known; parameters as of `with_channel_of`.
+    """The channel of a sensor whose noise is known; parameters as in `with_channel_of`.
 
     Two hypotheses are compared, and the more probable one decides: a leg in the air, whose mean torque is
     known within tolerances, and a leg on the ground under an unknown load, whose first harmonics say nothing.
@@ -225,7 +225,7 @@ class _Hypothesis:
         sigma = math.hypot(self._sigma * float(covariance[-1, -1]) ** 0.5, _FRICTION_ERROR)
         if not 0.0 <= friction <= _MOST_FRICTION:
             friction = min(max(friction, 0.0), _MOST_FRICTION)
-            # the best clearances with the friction at its bound
+            # best clearances with the friction at its bound
             x += covariance[-1] * ((friction - self._friction) / self._sigma - x[-1]) / covariance[-1, -1]
         rest = np.concatenate([residual - x @ columns, x])
         square = float(rest @ rest)
@@ -253,7 +253,7 @@ def _best_channel(
     *,
     first_order: bool,
 ) -> ChannelFit:
-    """The channel with the least residual; none unless one is clearly better.
+    """The channel with the least residual; None unless it is clearly better.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def _best_channel(
     def least(fits: Iterable[ChannelFit]) -> ChannelFit:
         return min(fits, key=lambda fit: fit.square)
 
-    # without delay and low-pass: with load friction if it is clearly better
+    # without delay and low-pass; with load friction only if it fits clearly better
     direct, none = fit_of(DIRECT), np.zeros_like(residual(DIRECT))
     frictionless = hypothesis.fit(DIRECT, residual(DIRECT), none, clearances(DIRECT))
     if frictionless.square - direct.square < _FRICTION_IMPROVEMENT:
@@ -323,7 +323,7 @@ def _refined(fit_of: Callable[[Channel], ChannelFit], near: Channel, *free: str)
 def _clearance_columns(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
     """Columns (k, F): change of the signature by one standard deviation of each clearance.
 
-    The smallest wider leg comes first among the legs of each joint.
+    Among the legs of each joint, the leg with the smallest increase comes first.
     """
     firsts = reference.of_joints[:, :1].ravel().tolist()
     expected = simulated_signatures(reference, 0, sensor, cycles=_CYCLES).mean(axis=0)

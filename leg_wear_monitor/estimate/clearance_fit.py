@@ -17,7 +17,7 @@ _NARROWER = 0.03  # the same on the narrow side for a new part, because wear onl
 # up. A and G at 0.45 mm left 2.1 to 2.4, and G was 0.33 ± 0.01 mm, B 0.35 ± 0.02 (2026-11-26)
 _EXPLAINED = 1.75
 _FIT_ROUNDS = 2
-_ELSEWHERE = 1.5  # times a clearance, where a search for each joint begins, too
+_ELSEWHERE = 1.5  # factor on a clearance where a further search for each joint begins
 _MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanation/diagnosis.md)
 
 

@@ -83,8 +83,8 @@ DIRECT = Channel()
 class DriveFigures:
     """Declared values of a drive, at the crank's shaft; NaN for undeclared values.
 
-    A motor's or a gear's own values are converted to the crank before: the torque by its turns per turn of
-    the crank, friction by speed and stiffness by their square.
+    Values of a motor or a gear are converted to the crank beforehand: torques with the gear ratio, friction
+    by speed and stiffness with its square.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class DriveFigures:
 
     @property
     def compliance(self) -> float:
-        """Declared compliance [rad/(N m)]; 0 without one, or if the drive is as good as rigid."""
+        """Declared compliance [rad/(N m)]; 0 if none is declared, or if the drive is practically rigid."""
         return 1.0 / self.stiffness_nm_per_rad if self.stiffness_nm_per_rad < _RIGID_NM_PER_RAD else 0.0
 
     @property

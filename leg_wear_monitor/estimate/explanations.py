@@ -38,8 +38,9 @@ _LEFT = 0.5
 # lie about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
 _LEAST_SECOND = 1.2  # over the modelled clearance: a smaller second opening may be an error of the model
 _PAIR_SIZES, _PAIR_ROUNDS, _PAIR_STEP, _PAIR_MIDDLE = 3, 2, 0.2, 1.5
-# mean square up to which it is noise alone: up to 1.4 of a healthy leg, a real motor's stick-slip too; where
-# two joints opened as well, which no single one explains, it would explain most of it (2026-11-27)
+# largest mean square that noise alone explains: up to 1.4 for a healthy leg, also with a real motor's
+# stick-slip. If two joints had opened, which no single joint explains, noise would explain most of it
+# (2026-11-27)
 _NOISE_ALONE = 2.0
 
 # Mean square up to which a joint is sure by itself: right names have 0.6 to 1.9. Else it must be far better
@@ -49,9 +50,10 @@ _ANYTHING_ELSE = "something else"
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
 # linear columns can show and a leg can have
-POOREST, _PART = 4.0, 0.3  # or this part of the residual without it: a large opening is known less well
+# or this fraction of the residual without it, because a large opening is known less precisely
+POOREST, _PART = 4.0, 0.3
 _POSSIBLE = {
-    Cause.MASS: (-0.9, 0.95),  # not at the end of the tried factors, where an opening may hide
+    Cause.MASS: (-0.9, 0.95),  # not at the end of the tried factors, where a larger clearance may stay hidden
     Cause.LENGTH: (-0.1, 0.1),
     Cause.SCALE: (0.2, 2.0),
     Cause.TIMING: (-0.1, 0.1),
@@ -107,7 +109,7 @@ class OtherSensor:
 
 @attrs.frozen(eq=False)
 class LeftOut:
-    """Some commissioned gait cycles, seen by the others.
+    """Some commissioned gait cycles, compared with the other cycles.
 
     Attributes
     ----------
@@ -322,7 +324,7 @@ class Explainer:
     def _pair(
         self, seen: _Seen, pair: Ints, sizes: Floats, misfits: "Misfits", modelled_m: Floats
     ) -> Explanation:
-        """Explanation by two open joints, over some clearances (n, 2) [m] about the best ones."""
+        """Explanation by two open joints, over some clearances (n, 2) [m] near the best pair."""
         best = int(misfits.value.argmin())
         square = float(misfits.square[best]) / len(seen.mean)
         likely = np.exp(-0.5 * (misfits.value - misfits.value[best]) / max(1.0, square))
@@ -405,7 +407,7 @@ class Explainer:
         )
 
     def _misfits(self, seen: _Seen, one: _Quantity, values: Floats) -> "Misfits":
-        """How well some values (n,) of a quantity explain."""
+        """Quality of the explanation by some values (n,) of a quantity."""
         tried, which = np.append(values, one.counted), np.full(len(values) + 1, one.number)
         at, variance = one.changes.at(tried, which)[0], one.changes.scatter_at(tried, which)
         change, scatter = at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
@@ -473,7 +475,7 @@ class Misfits:
         self._size = size
 
     def explanation(self, i: int, one: NamedCause, counted: float = 0.0) -> Explanation:
-        """How well the cause (i,) explains."""
+        """Quality of the explanation by each cause (i,)."""
         return Explanation(
             **attrs.asdict(one, recurse=False),
             counted=counted,
@@ -506,9 +508,9 @@ def opened(clearance_m: Floats, k: int, size: float) -> Floats:
 
 
 def _changed_by(factor: Explanation, without: float) -> list[Explanation]:
-    """Converts an explanation by a factor to the fraction of a change; none where it does not explain.
+    """Converts an explanation by a factor to the fraction of a change; none if it explains nothing.
 
-    A factor that may as well be 1 gives none, and so does friction with a large residual. A knee of 2 mm
+    A factor near 1 gives none, and friction with a large residual gives none either. A knee of 2 mm
     looked like 3.8 times the friction, and was to be watched, where the right cause leaves 0.6 to 2.1; and a
     foot 85 % heavier, which left 10 of 27, made the name of this knee unsure (2026-11-27).
     """
@@ -530,7 +532,7 @@ def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:
 
 
 def as_modelled(explanations: Sequence[Explanation]) -> Explanation:
-    """Among all explanations, that nothing has changed."""
+    """Among all explanations, the explanation that nothing has changed."""
     return next(one for one in explanations if one.cause is Cause.UNKNOWN)
 
 
@@ -566,7 +568,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
 
 
 def _is_rival(one: Explanation, best: Explanation) -> bool:
-    """True if an explanation contradicts the best one; a second open joint only adds to the first."""
+    """True if an explanation contradicts the best one; a second worn joint only adds to the first joint."""
     if one.cause is Cause.SEVERAL and best.cause is Cause.CLEARANCE:
         return False
     return (one.cause.fault_code, one.subject) != (best.cause.fault_code, best.subject)

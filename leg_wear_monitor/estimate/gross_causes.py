@@ -282,7 +282,7 @@ def _refined(curves: _Curves, one: _Fit) -> tuple[_Fit, Floats]:
     base = _turned(curves.predicted + load_n * curves.lever + mass * body, angle_rad)
     lever, heavier = _turned(curves.lever, angle_rad), _turned(body, angle_rad)
     columns = _reals(np.stack([base, factor * _slope(base), factor * lever, factor * heavier]))
-    # the factor of a reversed torque is refined, too, because it is reported
+    # the factor of a reversed torque is refined as well, because it is reported
     free = [causes.is_scaled or causes.sign < 0, causes.is_turned, causes.is_loaded, bool(causes.body)]
     kept = np.flatnonzero(free)
     residual = _reals(curves.measured - factor * base)

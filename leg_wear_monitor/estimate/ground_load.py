@@ -162,7 +162,7 @@ class _Leg:
         self._seen = np.array(shown)[:, : sensor.phases]
 
     def stance(self, x: Floats) -> Stance:
-        """When the foot stands."""
+        """Start and end of stance."""
         nominal = self._stance
         begin, end = nominal.heel_strike + _TIMING * x[1], nominal.toe_off + _TIMING * x[2]
         return attrs.evolve(nominal, heel_strike=float(begin), toe_off=float(end))
@@ -182,7 +182,7 @@ class _Leg:
         return np.concatenate([template[..., None], more], axis=-1)
 
     def _torques_of(self, begin: float, end: float) -> tuple[Floats, Floats]:
-        """Torques (1 + harmonics, points) of the shapes, by newton [N m/N]; the same for most differences."""
+        """Torques (1 + harmonics, points) of the shapes per newton [N m/N]; equal for most differences."""
         stance = self.stance(np.array([0.0, begin, end]))
         vertical, along = _shapes(stance, POINTS)
         return vertical * (self._lever @ stance.up), along * (self._lever @ stance.back)

@@ -40,18 +40,18 @@ from leg_wear_monitor.twin.references import (
     levels_of,
 )
 
-# misfit from which on a leg is identified, and the misfit at which identification ends: scatter alone leaves
-# 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at 0.45 mm was 0.48
-# to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
+# residual from which on a leg is identified, and the residual at which identification ends: scatter alone
+# leaves 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at 0.45 mm
+# was 0.48 to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
 WORTH_IDENTIFYING, ONLY_SCATTER = 0.6, 0.45
 
-FAR_FROM_FILE = 20.0  # misfit above which the ideal torque is fitted first
+FAR_FROM_FILE = 20.0  # torque residual above which the ideal torque is fitted first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about the file's bodies
 _LOG_FRICTION = 0.7  # standard deviation of the logarithm of its friction: a factor of two, greased or not
 _FAR = 0.03  # standard deviation of masses and lengths of a leg far from its file
 _HARMONICS = 6  # harmonics of the torque that show masses and lengths rather than impacts
-_IDEAL = 0.01  # fraction of the torque's size: effect of impacts on each harmonic
+_IDEAL = 0.01  # effect of impacts on each harmonic, as a fraction of the torque's size
 _STEP = 1.0e-4  # step of the differences for masses and lengths, in standard deviations
 _DONE = 1.0e-3  # last step of masses and lengths
 _LARGEST_LOG = 10.0  # largest logarithm of friction: far beyond a possible leg

@@ -287,7 +287,7 @@ def paired(motion: JointMotion, torque: Series) -> Pair:
     for number in np.unique(motion.recording):
         of_joint, of_torque = motion.recording == number, torque.recording == number
         time_s, times = motion.time_s[of_joint], torque.time_s[of_torque]
-        # torque samples within the motion, and of these the ones that are not in a gap of it
+        # torque samples during the motion, and those of them outside its gaps
         inside = (times >= time_s[0]) & (times <= time_s[-1])
         inside[inside] = np.interp(times[inside], time_s, motion.near[of_joint].astype(float)) > 0.5
         at = times[inside]

@@ -17,7 +17,7 @@ DATA_ERRORS = (LegWearError, ArithmeticError, np.linalg.LinAlgError)
 """Exceptions that measured data can make an estimator raise. Any other is a fault of this package."""
 
 _ROUNDS = 30
-_SHORTEST = 0.001  # fraction of a step that is tried last
+_SHORTEST = 0.001  # smallest tried fraction of a step
 _LESS = 1.0e-9  # fraction by which the square must decrease
 _SMALL = 1.0e-9  # singular values, as a fraction of the largest, that count as none
 
@@ -119,7 +119,7 @@ def solved(columns: Floats, values: Floats) -> Floats:
 
 
 def jackknife(estimate: Callable[[NDArray[np.bool_]], Floats], number: int, parts: int) -> Floats:
-    """Standard deviations of an estimate from some of the data, each of some parts left out in turn.
+    """Standard deviations of an estimate, from leaving out each part of the data in turn.
 
     Parameters
     ----------

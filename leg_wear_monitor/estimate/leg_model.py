@@ -32,7 +32,8 @@ from leg_wear_monitor.twin.references import TorqueReference
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
 _FRICTION_CHANGE = 0.1  # fraction of the torque's size
 _SCALE = 0.02
-_OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
+# a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed, the two cannot be distinguished
+_OFFSET_RAD = 0.01
 _LOAD_N = 5.0
 _LOAD_FRICTION = 0.03  # a gear that warms up
 # fractions of the ground's peak force: its mean over some steps, and the harmonics of its vertical and
@@ -49,7 +50,7 @@ _SCALE_STEP, _OFFSET_STEP_RAD, _LOAD_FRICTION_STEP = 0.1, 0.03, 0.05
 _MASS_STEP, _LENGTH_STEP = 0.05, 0.005
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
-_LATE_S = 0.005 * np.arange(0.5, 6.0)  # with a slower low-pass
+_LATE_S = 0.005 * np.arange(0.5, 6.0)  # reference legs with a slower low-pass
 _LATE_SIGMA_S = 0.0015  # about half of the step
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
 _NOISE_STEP = 0.16  # step of the noise's logarithm
@@ -158,14 +159,14 @@ def with_scatter_of(covariance: Floats, signatures: Floats) -> Floats:
 
 
 def parts_left_out(covariance: Floats, signatures: Floats) -> tuple[LeftOut, ...]:
-    """Parts of some commissioned gait cycles, signatures (n, F), each seen by the others.
+    """Parts of some commissioned gait cycles, signatures (n, F), each compared with the others.
 
     Within the cycles that a covariance was made of, any test scatters less than in later ones.
 
     Parameters
     ----------
     covariance : (F, F) array
-        Expected one, as of `with_scatter_of`.
+        Expected one, as in `with_scatter_of`.
     signatures : (n, F) array
     """
     if len(signatures) < _LEAST_PARTED:
@@ -244,7 +245,7 @@ def explainer_of(
 
 
 def compared_with(own: Explainer, commissioned: CommissionedTorque) -> Explainer:
-    """The same explainer of changes since a baseline, as of `explainer_of`; its own one knew no baseline."""
+    """The same explainer of changes, as in `explainer_of`, but with a baseline."""
     model = own.model
     expected = model.at(commissioned.clearance_m)[0]
     left_out = parts_left_out(model.covariance, commissioned.signatures)

@@ -80,7 +80,8 @@ class TorqueSensor:
         points, along = torque.shape[-1], np.sign(speed)
         omega = along * TURN * np.fft.rfftfreq(points, TURN / abs(speed) / points)
         response = self.channel.response(omega)
-        # a sample is the mean since the previous sample, or an instant; instants are averaged
+        # a sample is the mean since the previous sample, or an instantaneous value; instantaneous values are
+        # averaged
         if not self.is_instant:
             half = 0.5 * omega * self.period_s
             response *= np.sinc(half / math.pi) * np.exp(-1j * half)
@@ -197,8 +198,8 @@ def signature_of_torque(torque: Floats, sensor: TorqueSensor, speed: float) -> F
 # A torque sensor on simulated legs: its samples, and their signatures.
 
 
-# seed of the noise that is added to simulated torques: the same at each start, and different for each leg, or
-# their covariance would be the covariance of a single leg's cycles
+# seed of the noise on simulated torques: equal at each start, but different per leg. With equal noise, the
+# covariance would be too small
 _SEED = 20261122
 
 # draws of this noise for the mean signature of a leg: the noise is three quarters of the scatter of simulated
@@ -365,7 +366,7 @@ class Changes:
     @_slopes.default
     def _derivatives(self) -> Floats:
         """Derivatives (n, s - 1, F) by the logarithm of a value between points of the grid."""
-        with np.errstate(invalid="ignore", divide="ignore"):  # a clearance that cannot be wider
+        with np.errstate(invalid="ignore", divide="ignore"):  # a clearance that cannot grow further
             return np.asarray(np.diff(self.change, axis=1) / np.diff(self._log_grid, axis=1)[:, :, None])
 
 
@@ -650,7 +651,7 @@ class CommissionedTorque:
         return len(self.signatures)
 
     def measured_by(self, sensor: TorqueSensor) -> "CommissionedTorque":
-        """The same of a sensor."""
+        """Expected signatures for a sensor."""
         period_s, together, is_instant = sensor.period_s, sensor.together, sensor.is_instant
         return attrs.evolve(self, period_s=period_s, together=together, is_instant=is_instant)
 

@@ -219,9 +219,9 @@ def columns(
 
 
 _LONGEST_STEP_RAD = 0.2  # largest change of the phase per step: half a radian of the torque's third harmonic
-_DONE_RAD = 1.0e-3  # a twentieth of the phase shift by clearances
+_DONE_RAD = 1.0e-3  # a twentieth of the phase shift that clearances cause
 _EXACT_RAD = 1.0e-6
-_CHUNKS = 12  # stretches of time, each left out once
+_CHUNKS = 12  # number of time segments, each left out once
 _NO_TERMS = Terms()
 
 
@@ -323,7 +323,7 @@ class _Columns(Point):
 def fit(
     pair: Pair, model: TorqueModel, start: Start, terms: Terms = _NO_TERMS, with_errors: bool = False
 ) -> Fit:
-    """Best fit near a start; its standard deviations and last digits only if asked for: they take long."""
+    """Best fit near a start; standard deviations and last digits only on request, because they take long."""
     blocks = blocks_of(pair, start.ratio)
     measured = blocks.mean(pair.torque)
     begun = begin(pair, model, start)
@@ -372,7 +372,7 @@ def fit(
 
 
 def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, float]:
-    """Standard deviations by name."""
+    """Standard deviations by the names of the parameters."""
     moving = [name for name, is_free in (("ratio", terms.ratio), ("lag_s", terms.lag)) if is_free]
     names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), *moving)
     found = jackknife(lambda some: solved(by[:, some].T, rest[some]), len(rest), _CHUNKS)
@@ -403,7 +403,7 @@ def repeating(one: Fit) -> float:
 
 
 def _folded(one: Fit, which: Floats) -> Floats:
-    """Means of the rest over some turns, by part of the turn; NaN where there is none."""
+    """Means of the residual over some turns, by part of the turn; NaN for parts without samples."""
     bins = one.blocks.bin[which]
     number = np.bincount(bins, minlength=int(one.blocks.bin.max()) + 1)
     total = np.bincount(bins, one.rest[which], minlength=len(number))

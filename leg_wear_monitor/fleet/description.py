@@ -139,7 +139,7 @@ choose(Patterns, lambda value: (tuple[str, ...] if isinstance(value, list) else 
 
 @attrs.frozen(kw_only=True)
 class Defaults:
-    """Values for legs that have none of their own."""
+    """Values for legs without their own values."""
 
     config: str = described("parameter file of the monitor; if empty, the package's parameters", default="")
 
@@ -168,7 +168,7 @@ class FleetFile:
     """All keys of the file."""
 
     defaults: Defaults = described("values for legs without their own values", factory=Defaults)
-    out: str = described("directory of the fleet; a command may name its own", default="fleet")
+    out: str = described("directory of the fleet; --out overrides it", default="fleet")
     legs: tuple[LegEntry, ...] = described(
         "the legs", check=lambda legs: None if legs else "is empty. Expected at least one leg"
     )

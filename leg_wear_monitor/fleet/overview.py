@@ -49,9 +49,9 @@ class LegOverview:
     recordings : int
         Recordings that the description names now.
     counted : int
-        Recordings of these whose wear is in the ledger.
+        Number of these recordings whose wear is in the ledger.
     last_recording : str
-        Recording that ends last.
+        The recording with the latest end.
     last_ns : int
         Last stamp of this recording [ns]; 0 without a recording.
     faults : tuple of str
@@ -96,7 +96,7 @@ class LegOverview:
 
     @property
     def life(self) -> LifeHours | None:
-        """Remaining life of the leg; where the ledger alone is known, of the joint that lasts shortest."""
+        """Remaining life of the leg; if only the ledger is known, of the joint with the shortest life."""
         lives = self.state.life if self.state else {}
         known = [life for life in lives.values() if life]
         return lives.get("leg") or min(known, key=lambda life: life.p10_h, default=None)
@@ -144,7 +144,7 @@ class FleetOverview:
     Attributes
     ----------
     counts : dict of str to int
-        Number of legs in each state, from the mildest to the most severe, and of those that are ``unknown``.
+        Number of legs in each state, from the mildest to the most severe, and of ``unknown`` legs.
     legs : tuple of LegOverview
         The worst leg first.
     advice : str
@@ -174,7 +174,7 @@ class FleetOverview:
     def to_csv(self) -> str:
         """Text of ``fleet.csv``: one row per leg, the worst leg first.
 
-        An apostrophe stands before a text that a spreadsheet would compute, such as ``=HYPERLINK(...)``.
+        An apostrophe marks texts that a spreadsheet would compute, such as ``=HYPERLINK(...)``.
         """
         text = io.StringIO()
         rows = [{name: _as_text(value) for name, value in leg.row.items()} for leg in self.legs]

@@ -42,7 +42,8 @@ class ReadRecording:
     size, changed_ns : int
         Bytes of its files, and the time of their last change. If they differ, the recording is read again.
     settings : str
-        Digest of the settings of its leg. If it differs, a recording that was not counted is read again.
+        Digest of the settings of its leg. If it differs, a recording whose wear is not in the ledger is read
+        again.
     outcome : str
         Value of an `Outcome`.
     begin_ns, end_ns : int
@@ -84,7 +85,7 @@ class ReadRecording:
 
 
 def read_lines(directory: Path) -> dict[str, ReadRecording]:
-    """The last line about each recording, by its file; lines that are damaged or cut off are left out.
+    """The last line about each recording, by its file; damaged or incomplete lines are ignored.
 
     Without a line, its recording is replayed once more. The ledger then knows which time it already contains.
     """
@@ -106,11 +107,11 @@ def add_line(directory: Path, one: ReadRecording) -> None:
     Raises
     ------
     ConfigError
-        If the disk does not take it.
+        If the disk cannot be written.
     """
     path = directory / FILE
     with system_asked(path, "cannot be written"), path.open("ab") as file:
-        # the newline before it ends a line that a killed process has cut off
+        # the leading newline ends an incomplete line of a killed process
         file.write(b"\n" + json.dumps(part_document(one)).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())

@@ -1,6 +1,6 @@
 """The update of a fleet: the recordings that are new for a leg are replayed into the ledger of this leg.
 
-Each leg is one job, so no leg waits for a different one. A process may be killed at any moment: the ledger
+Each leg is one job, so no leg waits for the others. A process may be killed at any moment: the ledger
 contains the wear of a recording completely or not at all, and it tells which time it already contains.
 """
 
@@ -101,7 +101,7 @@ def update_fleet(
     scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FleetUpdate:
-    """Model the wear of a fleet's new recordings; the recordings of a leg are taken in the order of time.
+    """Model the wear of a fleet's new recordings; those of one leg in the order of time.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def update_fleet(
 
 
 def update_leg(leg: FleetLeg, out: Path) -> LegUpdate:
-    """Count the new recordings of one leg; a fault of the leg is a finding."""
+    """Model the wear of one leg's new recordings; a fault of the leg is a finding."""
     directory = leg_directory(out, leg.id)
     new: list[ReadRecording] = []
     fault, state = "", None
@@ -160,7 +160,7 @@ def update_leg(leg: FleetLeg, out: Path) -> LegUpdate:
 
 @contextmanager
 def _locked(directory: Path) -> Iterator[None]:
-    """Hold the directory of a leg; wait for a different update, or for a worker of a killed one."""
+    """Lock the directory of a leg; wait for other updates, or for a worker of a killed update."""
     with system_asked(directory, "cannot be written"):
         directory.mkdir(parents=True, exist_ok=True)
         file = (directory / ".lock").open("ab")
@@ -236,7 +236,9 @@ def _line(about: ReadRecording, result: ReplayResult) -> ReadRecording:
         texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
     elif monitor.is_all_counted:
         outcome = Outcome.ALREADY_COUNTED
-        texts.insert(0, "the ledger has this time already: the recording is a copy, or its clock is wrong")
+        texts.insert(
+            0, "the ledger contains this time already: the recording is a copy, or its clock is wrong"
+        )
     is_counted = outcome is Outcome.COUNTED
     return attrs.evolve(
         about,
@@ -251,7 +253,7 @@ def _line(about: ReadRecording, result: ReplayResult) -> ReadRecording:
 
 
 def _known_again(line: ReadRecording, leg: FleetLeg, directory: Path) -> ReadRecording:
-    """The line of a recording whose time is in the ledger: from itself, unless a different one covers it.
+    """The line of a recording whose time is in the ledger: its own, unless a different recording covers it.
 
     Its file may only have a new time of change, or its line may have been lost.
     """
@@ -277,7 +279,7 @@ def leg_state(leg: FleetLeg, directory: Path) -> LegState | None:
     if content is None or content.entry is None:
         return None
     summary = _summary(directory / SUMMARY)
-    if summary is not None and content.runs[-1].spans:  # a run of an operator's action adds no time
+    if summary is not None and content.runs[-1].spans:  # an operator's action is a run that adds no time
         return with_same_fields(LegState, summary, alarms=attrs.evolve(summary.alarms, changes=()))
     ledger = attrs.evolve(leg.config.ledger, path=str(directory / LEDGER))
     now = state_in_ledger(load_mechanism(leg.config.mechanism), attrs.evolve(leg.config, ledger=ledger))

@@ -46,7 +46,7 @@ class PaceConfig:
     )
     speeds_rpm: tuple[float, ...] = quantity(
         "rpm",
-        "speeds, one for each time; at 0 the leg stands, below 0 the crank turns clockwise",
+        "speeds, one per time; at 0 the leg stands, below 0 the crank turns clockwise",
         default=(60.0,),
     )
     ramp_s: float = quantity("s", "duration of a change of speed", above=0.0, default=0.5)
@@ -76,10 +76,10 @@ class EncoderConfig:
 
 @attrs.frozen(kw_only=True)
 class JointEncodersConfig:
-    """Further encoders, read with the crank's: each on a revolute joint, with errors of its own."""
+    """Further encoders in the messages of the crank: each on a revolute joint, with its own errors."""
 
     names: tuple[str, ...] = described(
-        "names of further encoders in joint_states, four at most; none if empty",
+        "names of further encoders in joint_states, at most four; if empty, none",
         default=(),
         check=_at_most_four,
     )
@@ -87,7 +87,7 @@ class JointEncodersConfig:
         "revolute joint of each encoder; the angle is from the bushing's body to the journal's", default=()
     )
     noise_rad: float = _not_negative("rad", "noise of the angles, standard deviation", 1.0e-4)
-    offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; 0 if empty", default=())
+    offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; if empty, 0", default=())
 
     def __attrs_post_init__(self) -> None:
         for key in ("joints", "offsets_rad"):
@@ -127,7 +127,7 @@ class FootLoadSensorConfig:
     )
     rate_hz: float = quantity("Hz", "messages per second", above=0.0, at_most=10000.0, default=200.0)
     noise_n: float = _not_negative("N", "noise of each component, standard deviation", 1.0)
-    silent_from_s: float = _not_negative("s", "time from which no message comes; 0 for never")
+    silent_from_s: float = _not_negative("s", "time after which no message is sent; 0 for never")
 
 
 @attrs.frozen(kw_only=True)
@@ -139,7 +139,7 @@ class TransportConfig:
     duplicate_fraction: float = _fraction("fraction of messages that arrive twice")
     late_fraction: float = _fraction("fraction of messages that arrive late, after newer ones")
     late_s: float = _not_negative("s", "delay of late messages", 0.02)
-    fault_fraction: float = _fraction("fraction of messages that are malformed, each fault in turn")
+    fault_fraction: float = _fraction("fraction of messages that are malformed, with alternating faults")
     gaps_s: tuple[float, ...] = _not_negative("s", "start times of gaps without messages", ())
     gap_s: float = _not_negative("s", "length of a gap", 0.5)
 
@@ -156,7 +156,7 @@ class LoadConfig:
         "N", "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air"
     )
     fore_aft: float = _fraction(
-        "largest fore-aft force of the ground, over the largest vertical force", FORE_AFT
+        "largest fore-aft force of the ground, as a fraction of the largest vertical force", FORE_AFT
     )
     shape: str = choice(
         GROUND_SHAPES,
@@ -166,13 +166,16 @@ class LoadConfig:
     heel_strike_shift: float = _shift("delay of the heel strike from its nominal phase, in gait cycles")
     toe_off_shift: float = _shift("delay of the toe-off from its nominal phase, in gait cycles")
     amplitude_scatter: float = _fraction(
-        "standard deviation of the ground's force from step to step, over its mean", 0.1, at_most=0.3
+        "standard deviation of the ground's force from step to step, as a fraction of its mean",
+        0.1,
+        at_most=0.3,
     )
     timing_scatter: float = _fraction(
         "standard deviation of the stance's time from step to step, in gait cycles", 0.02, at_most=0.1
     )
     heel_strike_transient: float = _fraction(
-        "peak of 20 ms that the heel strike adds to the vertical force, over its largest value", at_most=3.0
+        "peak of 20 ms that the heel strike adds to the vertical force, as a fraction of its largest value",
+        at_most=3.0,
     )
 
 
@@ -180,7 +183,7 @@ class LoadConfig:
 class KnockConfig:
     """A bushing that breaks: the joint's clearance changes at an instant."""
 
-    joint: str = described("the clearance joint, none if empty", default="")
+    joint: str = described("joint that breaks; if empty, none", default="")
     at_s: float = _not_negative("s", "time of the break", 5.0)
     clearance_m: float = quantity("m", "radial clearance after the break", above=0.0, default=1.0e-3)
 
@@ -195,16 +198,21 @@ class GaitConfig:
     seed: int = quantity("", "seed of all noise; equal seeds give equal data", at_least=0, default=0)
     duration_s: float = _not_negative("s", "duration of the gait, 0 for no end")
     clearance_joints: tuple[str, ...] = described(
-        "clearance joints; the mechanism's own if empty", default=()
+        "clearance joints; if empty, the joints in the mechanism file", default=()
     )
     clearances_m: tuple[float, ...] = quantity(
-        "m", "radial clearances of the clearance joints; the mechanism's own if empty", above=0.0, default=()
+        "m",
+        "radial clearances of the clearance joints; if empty, the joints in the mechanism file",
+        above=0.0,
+        default=(),
     )
     wear_acceleration: float = _not_negative("", "factor on all wear coefficients", 1.0)
     pace: PaceConfig = described("speed of the crank", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)
-    torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
+    torque_sensor: TorqueSensorConfig = described(
+        "the torque sensor of the drive", factory=TorqueSensorConfig
+    )
     foot_load_sensor: FootLoadSensorConfig = described(
         "a sensor of the ground's force on the foot", factory=FootLoadSensorConfig
     )

@@ -75,7 +75,7 @@ class Ground:
         self._whole = (stance.turned * (stance.toe_off - stance.heel_strike)) % 1.0
         half = 0.5 * (1.0 - self._whole)
         if half < _FURTHEST * self._load.timing_scatter + 0.01:
-            fault = f"{self._load.timing_scatter!r} leaves no swing beside {self._whole:.2f} turns of stance"
+            fault = f"{self._load.timing_scatter!r} leaves no swing after {self._whole:.2f} turns of stance"
             raise ConfigError("gait", "load.timing_scatter", fault)
         self.swing = stance.toe_off + stance.turned * half
 
@@ -101,7 +101,7 @@ class Ground:
 
 
 def _stance(mechanism: Mechanism, config: GaitConfig) -> Stance:
-    """Stance of a leg that walks as the crank first turns."""
+    """Stance of a leg that walks in the first direction of the crank."""
     load, nominal = config.load, nominal_stance(build_linkage(mechanism))
     if nominal.turned * next((rpm for rpm in config.pace.speeds_rpm if rpm), nominal.turned) < 0.0:
         ends = nominal.toe_off, nominal.heel_strike
@@ -128,7 +128,7 @@ def _waves(coefficients: tuple[float, ...], s: Floats) -> Floats:
 # Crank motion: a sequence of speeds joined by smooth ramps, with a phase-dependent ripple.
 
 
-_RIPPLE_PER_TURN = 2.0  # waves: the load of a leg has two swings a turn
+_RIPPLE_PER_TURN = 2.0  # harmonic: the load of a leg has two periods per turn
 
 
 class Pace:

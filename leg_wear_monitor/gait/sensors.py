@@ -41,7 +41,7 @@ _INJECTED_FAULTS = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WR
 class Reading(NamedTuple):
     """A sensor message: times of arrival and of measurement [s since the start], and its content.
 
-    ``kind`` is CRANK, TORQUE or LOAD; values that a different kind of sensor measures are NaN or empty. A
+    ``kind`` is CRANK, TORQUE or LOAD; values of other kinds of sensors are NaN or empty. A
     reading with a ``fault`` (a key of `FAULTS`) is sent as a message with this fault.
     """
 
@@ -57,7 +57,7 @@ class Reading(NamedTuple):
 
 
 class Noise:
-    """Normal and uniform random numbers one by one; drawn in blocks, which is ten times as fast."""
+    """Normal and uniform random numbers one by one, drawn in blocks because that is ten times as fast."""
 
     def __init__(self, seed: list[int]) -> None:
         self._rng = np.random.default_rng(seed)
@@ -183,8 +183,8 @@ def _transported(measured: Iterable[Reading], config: TransportConfig, noise: No
     for reading in measured:
         while in_transit and in_transit[0][0] <= reading.taken_s:
             yield heapq.heappop(in_transit)[2]
-        # We draw four numbers for each reading, used or not, so that one setting does not change the effects
-        # of the other settings.
+        # We always draw four numbers per reading, so that one setting does not change the effects of the
+        # other settings.
         chance = [noise.uniform() for _ in range(4)]
         if chance[0] < config.drop_fraction or _in_gap(reading.taken_s, config):
             continue

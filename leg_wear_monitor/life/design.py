@@ -42,9 +42,10 @@ CLEARANCES_M = 25.0e-6, 50.0e-6, 100.0e-6
 
 _P90 = 1.2815515655446004  # standard deviations from the median to the 90th percentile
 _NOMINAL = 1.0e-15  # 1/Pa: coefficient of the simulated life; it scales only the time, which is not used
-_LEAST_GROWTH = 1.0e-3  # of the fastest joint's: bounds the factor of a joint that hardly slides
+# fraction of the fastest joint's sliding: bounds the factor of a joint that hardly slides
+_LEAST_GROWTH = 1.0e-3
 _CYCLES = 12  # gait cycles of the forces that are compared with the makers' limits
-_STEPS = 64  # of a life's integral over the clearance
+_STEPS = 64  # points of a life's integral over the clearance
 
 
 @attrs.frozen(kw_only=True)
@@ -161,7 +162,7 @@ def design(
 
 
 def _smallest_that_lasts(row: BushingLife) -> tuple[bool, float, float]:
-    """Order of the rows of a joint: those that last, then by size, then the longest life first."""
+    """Order of the rows of a joint: first the bushings that last, then by size, then by life."""
     longest = row.wear_h[1] if row.wear_h else row.rating_h or 0.0
     return not row.lasts, row.diameter_m * row.width_m, -longest
 

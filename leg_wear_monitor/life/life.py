@@ -41,7 +41,7 @@ from leg_wear_monitor.mechanism.materials import check_wear_is_known
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
-# Cycle jumps: the mean wear of a few gait cycles, applied to many (physics.md section 10).
+# Cycle jumps:the mean wear of a few gait cycles, applied to many cycles (physics.md section 10).
 #
 # Wear depth over gait cycles obeys an ordinary differential equation. Its right-hand side, the mean wear per
 # cycle, has scatter, because single cycles are chaotic. A jump is a step of Heun's method: an Euler step to
@@ -51,7 +51,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 # step-size control as for ODE solvers: largest growth and shrinkage of a jump, safety factor
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
 _TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest change
-_SMOOTH_DEG = 5.0  # standard deviation of the window that rates are smoothed by
+_SMOOTH_DEG = 5.0  # standard deviation of the window that smooths the rates
 
 
 @attrs.frozen(eq=False)
@@ -88,7 +88,7 @@ def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
     worn : (n, k, 2, N) array, m
         Wear depth of each of n cycles.
     smooth_deg : float
-        Width of the smoothing window over the angle [deg]: few cycles have contact in few sectors only. The
+        Width of the smoothing window over the angle [deg]: in few cycles, only few sectors have contact. The
         worn volume is conserved.
     """
     growth = opening(worn)
@@ -547,7 +547,7 @@ def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
 
 
 LEAST_FRACTION = 0.05  # least fraction of the growth to its limit that a joint reaches in every life
-LEAST_OPENING = 1.0e-3  # of the first joint's opening: bounds the factor of a joint that hardly wears
+LEAST_OPENING = 1.0e-3  # fraction of the first joint's wear: bounds the factor of a joint that hardly wears
 _DIGITS = 6
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # Duty of a leg: hours per day that it walks under each load of the ground.
 
 
-_MOST_N = 10_000.0  # of a peak: ten times a person's weight
+_MOST_N = 10_000.0  # largest peak: ten times a person's weight
 _HOURS_OF_A_DAY = 24.0
 
 
@@ -71,7 +71,7 @@ class Duty:
 
     @classmethod
     def parse(cls, text: str) -> "Duty":
-        """Duty of a text such as ``0:2,300:5,600:1``: peak [N] and hours per day of each part.
+        """The duty in a text such as ``0:2,300:5,600:1``: peak [N] and hours per day of each part.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class Life:
     part_growth_m_per_cycle: Floats
 
     def cycles_to(self, k: int, clearance_m: float) -> float:
-        """Gait cycles at which joint k's mean clearance reaches a value; extrapolated at its last rate.
+        """Gait cycles at which joint k's mean clearance reaches a value; extrapolated with its last growth.
 
         Infinite if it does not grow, 0 if it was reached from the start.
         """
@@ -294,7 +294,7 @@ def rating_hours(settings: Clearance, load: float) -> float | None:
 
 
 def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
-    """Validity of each joint's life, as written by ``life --json``; same parameters as `pressure_speed`."""
+    """Validity of each joint's life for ``life --json``; same parameters as `pressure_speed`."""
     loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
     found = {}
     for joint in life.clearance_joints:

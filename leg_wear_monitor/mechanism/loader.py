@@ -35,9 +35,11 @@ from leg_wear_monitor.mechanism.spec import (
 # unusual in relation to other values. The ranges are wide: the shipped mechanisms, from Andrews' squeezer
 # with links of 7 mm to a leg, lie well within.
 
-_USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
-_LEAST_SPREAD = 0.3  # of ln k: repeats of one careful test scatter by 0.1 to 0.3, parts by more
-_ROUND = 1.0e-3  # rpm: a converted speed in rad/s is within this of a whole number of rpm
+_USUAL_LENGTH = 5.0e-3, 5.0  # length of the largest link [m]
+# least spread of ln k: repeats of one careful test scatter by 0.1 to 0.3, different parts by more
+_LEAST_SPREAD = 0.3
+# a speed in rad/s that was converted from rpm is within this distance of a whole number of rpm
+_ROUND = 1.0e-3
 
 
 def doubts(mechanism: spec.Mechanism) -> tuple[Doubt, ...]:
@@ -135,7 +137,7 @@ def _inertia(name: str, body: spec.Body, length: float) -> Iterator[Doubt]:
 def _gravity(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     pull = math.hypot(*mechanism.gravity)
     if pull > 30.0:
-        yield Doubt("gravity", f"{pull:g} m/s^2, on earth it is 9.81 m/s^2. Is it in mm/s^2?")
+        yield Doubt("gravity", f"{pull:g} m/s^2, but on earth it is 9.81 m/s^2. Is it in mm/s^2?")
 
 
 def _joints(mechanism: spec.Mechanism) -> Iterator[Doubt]:
@@ -160,7 +162,7 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
         yield Doubt("material", f"{c.material} {fault}")
     spread = spread_of(c, math.inf)
     if spread is not None and spread < _LEAST_SPREAD:
-        fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}. Is it the spread of repeats?"
+        fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}. Is it from repeats?"
         yield Doubt("material", fault)
 
 
@@ -258,7 +260,7 @@ def check_references(mechanism: Mechanism) -> None:
     """
     if GROUND in mechanism.bodies:
         raise ConfigError(
-            mechanism.source, "bodies.ground", "is not a moving body, give its points under the key ground"
+            mechanism.source, "bodies.ground", "is not a moving body. Give its points under the key ground"
         )
     _check_joints(mechanism)
     _need_moving(mechanism, mechanism.drive.body, "drive.body")
@@ -385,7 +387,7 @@ def clearance_joints(
             raise ConfigError(
                 source,
                 f"clearances.joints.{name}",
-                f"{what}, only a revolute joint can have clearance: {', '.join(revolute)}",
+                f"{what}. Only revolute joints can have clearance: {', '.join(revolute)}",
             )
     # complete defaults also apply to joints that only the command line names
     named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own

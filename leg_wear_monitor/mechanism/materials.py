@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
 # Units of the files of materials and drives, by measured quantity, and their factors to SI.
 #
-# Two traps are spelled out. A dimensionless K of Archard's law is worth nothing without the form of the law:
+# Two units need care. A dimensionless K of Archard's law has no meaning without the form of the law:
 # books write V = K F s / H and V = K F s / (3 H), so the unit names the form, and K / H or K / (3 H) is the
 # wear coefficient of this package. Makers give a wear rate in µm/km at a pressure, so the unit names 1 MPa.
 
@@ -91,7 +91,7 @@ def _interval(interval: tuple[float, float]) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class SourcedValue:
-    """A number with its source; a range alone stands for its middle."""
+    """A number with its source; a range alone means its middle."""
 
     value: float | None = described("the number; without it, the middle of range", default=None)
     unit: str = described("its unit, from the table below")
@@ -135,7 +135,7 @@ class WearCoefficient(SourcedValue):
     """A wear coefficient; a dimensionless K comes with the hardness that it belongs to."""
 
     hardness: SourcedValue | None = described(
-        "hardness by which a dimensionless K is divided",
+        "hardness that divides a dimensionless K",
         default=None,
         check=lambda value: unit_fault("pressure", value),
     )
@@ -215,8 +215,8 @@ def _document(part: Any) -> Any:
 class Drive(SourcedFile):
     """A motor with its gear and controller; values without a source are left out."""
 
-    name: str = described("name, as the file's")
-    title: str = described("maker, type and gear, in words")
+    name: str = described("name, equal to the name of the file")
+    title: str = described("maker, type and gear in words")
     shaft: str = choice(
         SHAFTS,
         "shaft of the torques and speeds below: the drive's output, or the motor before its gear",
@@ -305,7 +305,7 @@ class Side:
     youngs_modulus: SourcedValue | None = sourced("pressure", "Young's modulus")
     poissons_ratio: SourcedValue | None = sourced("number", "Poisson's ratio")
     wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "wear coefficient of this body")
-    roughness: SourcedValue | None = sourced("roughness", "Ra that the source asks for")
+    roughness: SourcedValue | None = sourced("roughness", "surface roughness Ra that the source requires")
     is_counted: bool = described(
         "false if the source gives only the wear of the other body",
         default=True,
@@ -350,12 +350,12 @@ class RatingLife:
 class Material(SourcedFile):
     """A pair of bushing and journal with its lubricant."""
 
-    name: str = described("name, as the file's")
-    title: str = described("the pair, in words")
+    name: str = described("name, equal to the name of the file")
+    title: str = described("the pair in words")
     bushing: Side = described("the bushing, a mapping of the keys below")
     journal: Side = described("the journal, a mapping of the keys below")
     lubricant: str = described("lubricant: none, or the grease or oil")
-    regime: str = described("regime of wear that the numbers hold for")
+    regime: str = described("wear regime for which the values are valid")
     friction: SourcedValue | None = sourced("number", "friction coefficient")
     limits: Limits = described("limits, a mapping of the keys below", factory=Limits)
     rating_life: RatingLife | None = described("constants of the maker's formula of life", default=None)
@@ -363,7 +363,7 @@ class Material(SourcedFile):
 
     @property
     def wear_coefficients(self) -> tuple[float, float] | None:
-        """Wear coefficients of bushing and journal [1/Pa]; None if one is neither known nor excluded."""
+        """Wear coefficients of bushing and journal [1/Pa]; None if a coefficient is unknown."""
         bushing, journal = self.bushing.wear_si, self.journal.wear_si
         return None if bushing is None or journal is None else (bushing, journal)
 
@@ -592,7 +592,9 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
         If no joint has clearance, or if the pairs of all joints have limits only; it names the first joint.
     """
     if not tuple(joints):
-        raise ConfigError(mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear")
+        raise ConfigError(
+            mechanism.source, "clearances.joints", "no joint has clearance, so nothing can wear"
+        )
     known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
     if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
         raise ConfigError(

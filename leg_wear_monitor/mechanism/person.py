@@ -111,7 +111,8 @@ def _with(
 PHASES = 128  # entries of a load's table; a divisor of the number of points of the leg's tables
 FORE_AFT = 0.145  # mean of the peaks of braking and of pushing, over the peak of the vertical force
 
-_VERTICAL = (1.143, -0.042, 0.337, 0.0, -0.0125, -0.016, -0.0655, 0.0105)  # of sin(k pi s), s over stance
+# coefficients of sin(k pi s), with s from 0 to 1 over stance
+_VERTICAL = (1.143, -0.042, 0.337, 0.0, -0.0125, -0.016, -0.0655, 0.0105)
 _STANCE = 0.8  # middle part of the toe's way backwards that is stance
 _POINTS = 1024
 
@@ -119,7 +120,7 @@ GROUND_LOAD = "ground"  # name of the load in a mechanism
 
 _OF_FORCE = ("crank_angle", "foot_load", "foot_load_along")  # columns of a file with the force on the toe
 _LEAST_ROWS = 11  # after the first one
-USUAL_PEAK_N = 10.0, 5000.0  # of the vertical force: a child's step, and a run of 150 kg
+USUAL_PEAK_N = 10.0, 5000.0  # bounds of the vertical force: a child's step, and a running person of 150 kg
 
 
 @attrs.frozen

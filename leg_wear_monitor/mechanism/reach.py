@@ -38,8 +38,8 @@ class DeadPoint(NamedTuple):
 
 
 POINTS = 180  # a cycle: smooth to the eye
-_OPEN_POINTS = 72  # for an open mechanism, because its positions take long
-_VISIBLE = 0.02  # of the largest gap
+_OPEN_POINTS = 72  # fewer steps for an open mechanism, because its positions take long
+_VISIBLE = 0.02  # fraction of the largest gap
 _CLOSED = 1.0e-9  # gap [m] below which a joint counts as closed
 
 

@@ -12,7 +12,7 @@ from leg_wear_monitor.mechanism import FRICTION_LAWS, NORMAL_LAWS
 # Settings of a revolute clearance joint: geometry, material, contact laws and wear.
 
 
-Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number stands for both
+Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number applies to both
 
 
 def _rises(ramp: tuple[float, float]) -> str | None:
@@ -59,7 +59,7 @@ class Clearance:
     width: float = quantity(
         "m", "axial contact width", above=0.0, at_most=1.0, usual=(1.0e-4, 0.5), doubt=_length_slip
     )
-    radial_clearance: float = quantity("m", "bushing radius less journal radius", above=0.0)
+    radial_clearance: float = quantity("m", "bushing radius minus journal radius", above=0.0)
     youngs_modulus: Pair = quantity(
         "Pa", "Young's modulus", above=0.0, usual=(1.0e6, 2.0e12), doubt=_modulus_slip
     )
@@ -275,8 +275,8 @@ Drive = SpeedDrive | TorqueDrive | TrackDrive
 class Spring:
     """A linear spring and damper between a point on each of two bodies."""
 
-    bodies: tuple[str, str] = described("the two bodies, one may be the ground")
-    points: tuple[str, str] = described("its point on each of them")
+    bodies: tuple[str, str] = described("the two bodies; one may be the ground")
+    points: tuple[str, str] = described("its point on each body")
     stiffness: float = quantity("N/m", "stiffness", at_least=0.0)
     free_length: float = quantity("m", "length without force", at_least=0.0)
     damping: float = quantity("N s/m", "viscous damping", at_least=0.0, default=0.0)

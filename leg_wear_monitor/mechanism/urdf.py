@@ -124,7 +124,7 @@ def _link(mechanism: Mechanism, body: str, origin: Vector) -> ElementTree.Elemen
         length = math.dist(begin, end)
         visual = ElementTree.SubElement(link, "visual")
         middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]))
-        # from the cylinder's axis z to the side
+        # rotation from the cylinder's axis z to the side
         pitch = math.atan2(begin[0] - end[0], end[1] - begin[1])
         _origin(visual, middle, origin, pitch)
         geometry = ElementTree.SubElement(visual, "geometry")

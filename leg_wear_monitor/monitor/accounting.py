@@ -64,11 +64,11 @@ def is_within(stamp_ns: Ints, spans: Ints) -> NDArray[np.bool_]:
 
 
 POINT_S = 600.0  # walking time between two points of the clearances' history
-# or this fraction of all walking so far, if it is more: a year of 8 h a day then has some 1100 points, not 17
-# 500
+# or this fraction of all walking so far, if that is longer: a year of 8 h per day then has about 1100
+# points, not 17 500
 POINT_FRACTION = 0.005
 
-_DUE_KEY = "history_due_s"  # moving_s at which the history takes its next point; of totals
+_DUE_KEY = "history_due_s"  # moving_s, from the totals, at which the history takes its next point
 
 _SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
 
@@ -103,9 +103,9 @@ class Accounting:
         Gait cycles over all runs.
     parts : tuple of PartLife
     spans : Spans
-        Time whose wear this run has counted, by the present epoch of the clock.
+        Time whose wear this run has modelled, by the present epoch of the clock.
     skipped, skipped_s : int, float
-        Number of samples skipped because an earlier run counted their wear, and their time.
+        Number of samples skipped because an earlier run modelled their wear, and their time.
     without_zero_s : float
         Time of samples that did not reach the twin, because the crank's zero is not known.
     commissioned : dict of str to float
@@ -167,7 +167,7 @@ class Accounting:
         return int(self._before.get("cycles", 0))
 
     def limit_before_m(self, joint: str) -> float | None:
-        """Limit of a joint's clearance [m] that the ledger was written with; None if it does not know it."""
+        """Limit of a joint's clearance [m] in the ledger; None if the ledger does not have it."""
         if limit_m := self._before.get(clearance_limit_key(joint)):
             return limit_m
         entry = self.ledger.entry if self.ledger else None
@@ -178,7 +178,7 @@ class Accounting:
     def unmonitored_s(self) -> float:
         """Time in which the leg was not tracked in this run.
 
-        It excludes time that earlier runs have counted, and pauses between recordings.
+        It excludes time that earlier runs have modelled, and pauses between recordings.
         """
         unmonitored_s = self._twin.intake.unmonitored_s
         others_s = self.skipped_s + self._pauses.passed_s(unmonitored_s)
@@ -330,7 +330,7 @@ class Accounting:
             self.ledger.note(event)
 
     def note_alarms(self, change: AlarmList) -> None:
-        """Note the alarms whose shown state has changed."""
+        """Note the alarms whose published state has changed."""
         shown = {alarm.name: (alarm.level, alarm.acknowledged) for alarm in change.alarms}
         for alarm in change.alarms:
             if shown[alarm.name] != self._shown.get(alarm.name, (Level.OK, False)):

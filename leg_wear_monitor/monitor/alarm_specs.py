@@ -190,7 +190,7 @@ DEPARTURE = AlarmSpec(
     quantity="difference between the clearance from encoders and the modelled clearance",
     meaning="difference between the clearance from further encoders and the modelled clearance, m; 0 below "
     "four standard deviations. Only with `encoders.names`",
-    **_constant(1.0e-4, "0.1 mm"),  # a third of a new clearance
+    **_constant(1.0e-4, "0.1 mm"),  # limit: a third of a new clearance
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
 )
 MISMATCH = AlarmSpec(
@@ -261,7 +261,7 @@ def _rate(name: str) -> AlarmSpec:
         unit="Hz",
         quantity=f"rate of usable {name} samples",
         meaning=f"rate of usable {name} samples, Hz",
-        **_constant(40.0, "40 Hz"),  # five samples in a period of the tracker's bandwidth, 8 Hz
+        **_constant(40.0, "40 Hz"),  # five samples per period of the tracker's bandwidth of 8 Hz
         value=lambda health: health.rate_hz[name],
         is_least=True,
         is_latched=False,

@@ -144,7 +144,7 @@ def next_level(
     beyond : tuple of int
         As returned by the previous call, (0, 0) at first.
     cycles : int
-        Gait cycles the value stands for.
+        Number of gait cycles of the value.
     """
     beyond_warn, beyond_error = (
         before + (limit.on_delay if limit.is_far(value, at) else cycles) if limit.reaches(value, at) else 0
@@ -178,7 +178,7 @@ def evaluated(
     stamp_ns : int
         Stamp of the value.
     cycles : int
-        Gait cycles the value stands for.
+        Number of gait cycles of the value.
     sigma : float
         Standard deviation of the value.
     cause : str
@@ -287,7 +287,7 @@ FAULT_CODES = {
     TRACKING_LOST: "the monitor cannot track the crank, see `input`",
     CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
     ENCODERS: "a further encoder gives no usable angles",
-    DIAGNOSIS: "the drive torque shows a change; the code of the verdict names it",
+    DIAGNOSIS: "the drive torque indicates a change; the code of the verdict names it",
     LEDGER_NOT_WRITTEN: "the ledger cannot be written",
     LEDGER_INTERRUPTED: "an earlier run was interrupted",
     SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
@@ -355,8 +355,9 @@ def guide_of(code: str) -> str:
 # Human-readable texts of an alarm: its state, its worst value, its start.
 
 
+_ROUNDING = 1.0e-12  # a smaller value is a rounding error
 _FIRST_DATE_S = 1.0e8  # a smaller stamp is from a clock that began at zero
-_SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "um/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
+_SHOWN = {"m": (1.0e3, "mm"), "m/h": (1.0e6, "µm/h"), "s": (1.0e3, "ms"), "rad": (1.0e3, "mrad")}
 
 ADVICE = "The monitor advises. The absence of an alarm does not mean the joints are healthy."
 
@@ -436,4 +437,6 @@ def amount(value: float, unit: str) -> str:
 def _digits(value: float) -> str:
     if math.isnan(value):
         return "unknown"
+    if abs(value) < _ROUNDING:
+        return "0"  # without the sign or the exponent of a rounding error
     return f"{value:.0f}" if 999.5 <= abs(value) < 1.0e6 else f"{value:.3g}"

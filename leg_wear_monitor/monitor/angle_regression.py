@@ -41,7 +41,7 @@ class Estimate:
 
     @property
     def sigma_m(self) -> Floats:
-        """Their standard deviations (k,)."""
+        """Standard deviations of the clearances (k,)."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance)[: self.joints]))
 
 
@@ -216,7 +216,7 @@ class ClearanceRegression:
         each = np.array(self._each)
         size = len(each) // _BATCH
         batches = each[len(each) - _BATCH * size :].reshape(size, _BATCH, -1).mean(axis=1)
-        # from differences of neighbouring cycles, so that a slow change does not count as scatter
+        # scatter from differences of neighbouring cycles, so that slow changes do not add to it
         steps = np.diff(batches, axis=0)
         scatter = steps.T @ steps / (2.0 * len(steps))
         # the reference adds the scatter of the cycles that it was simulated from
@@ -286,7 +286,7 @@ class ClearanceEstimate:
 
     @property
     def is_other(self) -> bool:
-        """True if the clearance differs significantly from the modelled one."""
+        """True if the clearance differs significantly from the modelled clearance."""
         return abs(self.departure_m) >= max(LEAST_M, SURE_SIGMAS * self.sigma_m)
 
     @property

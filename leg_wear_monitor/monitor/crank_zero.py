@@ -133,7 +133,7 @@ class CrankZero(Observer):
     def _breaks(self, samples: Samples) -> list[tuple[int, float]]:
         """Index of each crank sample that does not continue the one before, and its jump; NaN after a gap.
 
-        The encoder may have restarted there. It did not in a gap after which the angle has counted on.
+        The encoder may have restarted in a gap, unless the angle continues after it.
         """
         state, tracker = self.state, self._tracker
         is_possible = np.abs(samples["crank_angle_rad"]) <= KINDS[CRANK].largest
@@ -262,7 +262,7 @@ class CrankZero(Observer):
 # Turns of the crank that were walked at the commanded cadence, among the samples that wait.
 
 
-MOST_TURNS = 16  # as many as a sensor that samples instants needs, see docs/appendix/commissioning.md
+MOST_TURNS = 16  # number that a sensor of instantaneous values needs, see docs/appendix/commissioning.md
 _STANDS = 0.1  # turns in the time of a gait cycle
 _LONGEST = 1.5  # times the time of the commanded turns, for slower ones
 
@@ -348,7 +348,7 @@ def _turns(crank: Series, cadence: Cadence, longest_gap_s: float) -> tuple[int, 
 
 
 def _why_none(crank: Series, cadence: Cadence) -> str:
-    """Why the last turn was not walked at the commanded cadence; empty if it was not long enough."""
+    """Why the last turn was not at the commanded cadence; empty if it was too short to decide."""
     cycle_s = 60.0 / abs(cadence.commanded_rpm)
     before = np.flatnonzero(crank.time_s <= crank.time_s[-1] - cycle_s)
     if not len(before):
@@ -369,7 +369,7 @@ def _why_none(crank: Series, cadence: Cadence) -> str:
 # The crank's zero from the phase of the drive torque, or why it cannot be found.
 
 
-LEAST_TURNS = 3  # two were enough for sensors that average; the third shows the repeating residual
+LEAST_TURNS = 3  # two turns are enough for averaging sensors; the third shows the repeating residual
 _SURE_RAD = 0.015  # scatter that a found zero may have in addition to the error of the model
 _LEAST_SAMPLES = 25  # torque samples in a turn: two and a half in a period of the tenth harmonic
 _SCANNED = 100  # samples of a turn that are enough to find the phases that are worth a fit
@@ -480,8 +480,7 @@ def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
         )
     if best.sigma["offset_rad"] > _SURE_RAD:
         return (
-            f"the zero is uncertain by {best.sigma['offset_rad']:.2g} rad. "
-            f"Expected {_SURE_RAD:g} rad: the drive "
-            "torque scatters"
+            f"the drive torque scatters: the zero is uncertain by {best.sigma['offset_rad']:.2g} rad. "
+            f"Expected {_SURE_RAD:g} rad"
         )
     return ""

@@ -170,7 +170,7 @@ def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
     if len(finite) < _LEAST_PHASES:
         return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
     if rms(finite - finite.mean()) > _FAULTY_RAD:
-        return f"does not turn as joint {joint} does, look at encoders.joints and encoders.signs"
+        return f"does not turn like joint {joint}: check encoders.joints and encoders.signs"
     return ""
 
 

@@ -204,7 +204,7 @@ class AlarmBoard:
 
 
 A_CYCLE = 4
-IDLE_LIMIT, LIMIT = 50, 50_000  # samples without time, samples in all
+IDLE_LIMIT, LIMIT = 50, 50_000  # number of samples without a time, number of all samples
 
 PERIOD_STATE = np.dtype(
     [
@@ -221,7 +221,7 @@ PERIOD_STATE = np.dtype(
 def find_period_end(stamp, first, length, states):  # type: ignore[no-untyped-def]
     """Index after the sample, from ``first`` on, that ends the period; -1 if none does.
 
-    ``stamp`` (n,) [ns], not above 0 where a sample has none; ``length`` of a period [ns]; the only one of
+    ``stamp`` (n,) [ns], not above 0 if a sample has no stamp; ``length`` of a period [ns]; the only state in
     ``states`` is changed.
     """
     state = states[0]
@@ -270,7 +270,7 @@ class EvaluationPeriods:
             begin = end if end > 0 else len(samples)
 
 
-_FASTER = 1.1  # than commanded; the default tolerance of the cadence is a tenth
+_FASTER = 1.1  # factor on the commanded cadence; the default tolerance is a tenth
 
 
 class AlarmEvaluation:

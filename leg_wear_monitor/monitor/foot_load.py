@@ -77,7 +77,7 @@ class FootLoadCheck(Observer):
     Raises
     ------
     ConfigError
-        For a mechanism whose toe does not walk.
+        If the toe of the mechanism does not move back and forth.
     """
 
     def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
@@ -95,7 +95,7 @@ class FootLoadCheck(Observer):
         )
         self._toe_per_turn = point_motion(motion, linkage, *(mechanism.toe or ("", "")))[1][1::2].T
         phase = (np.arange(FINE_PHASES) + 0.5) / FINE_PHASES
-        # phases from the margin before heel strike on; stance lasts `whole` turns
+        # phases, starting at the margin before heel strike; stance lasts `whole` turns
         whole = (stance.turned * (stance.toe_off - stance.heel_strike)) % 1.0
         self._swing = (
             stance.turned * (phase - stance.heel_strike) + _SWING_MARGIN
@@ -107,7 +107,7 @@ class FootLoadCheck(Observer):
         self._cycles: tuple[_Cycle, ...] = ()
         self._acted = 0.0  # `_Cycle.acted` of the present gait cycle; at first no mean is known
         self._largest_n = 0.0  # largest force received since the last gait cycle, unusable values included
-        self._is_missing = False  # whether the last gait cycle had no sample
+        self._is_missing = False  # True if the last gait cycle had no sample
         self._is_frozen = False  # whether the samples do not act
         self._has_mean = False  # whether the twin knows a mean load of gait cycles
         self._is_noise = False  # whether the load of the last gait cycles is not above the sensor's noise
@@ -154,7 +154,7 @@ class FootLoadCheck(Observer):
         """Two flags: the last gait cycle shows a wrong load or none; the load has always been wrong.
 
         A sensor that got stuck, lost its zero or went silent was right before; any other fault, and noise
-        without a load, holds for earlier cycles, too.
+        without a load, applies to earlier cycles as well.
         """
         wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
         is_frozen = self._is_missing or bool(wrong - {GAPS})
@@ -167,12 +167,12 @@ class FootLoadCheck(Observer):
     def acts(self) -> str:
         """Sentence on the foot load that acts on the leg."""
         if not self._load_acts:
-            return "the load by the drive torque acts, if there is one"
+            return "the model uses the load estimated from the drive torque, if there is one"
         if not self._has_mean:
-            return "no load acts: the modelled wear on the ground is too small"
+            return "the model uses no load, so the modelled wear on the ground is too small"
         if self._is_frozen:
-            return "the mean load of earlier gait cycles acts"
-        return "the mean load of the last gait cycles acts"
+            return "the model uses the mean load of earlier gait cycles"
+        return "the model uses the mean load of the last gait cycles"
 
     @property
     def load(self) -> FootLoad:
@@ -232,7 +232,7 @@ class FootLoadCheck(Observer):
             messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
         if outliers:
             noun = "sample is an outlier" if outliers == 1 else "samples are outliers"
-            messages.append(f"{outliers} {noun}, far from the samples before and after, and not used")
+            messages.append(f"{outliers} {noun}, far from the samples before and after; not used")
         return (Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised)),)
 
     def _stance_phases(self, up: Floats) -> Floats:
@@ -318,7 +318,7 @@ def _stuck_fraction(load: LoadProfile) -> float:
 
 
 def _correlation(one: Floats, other: Floats) -> float:
-    """Correlation coefficient; 0 if one is constant."""
+    """Correlation coefficient; 0 if one of the series is constant."""
     a, b = one - one.mean(), other - other.mean()
     size = math.sqrt(float(a @ a) * float(b @ b))
     return float(a @ b) / size if size > 0.0 else 0.0

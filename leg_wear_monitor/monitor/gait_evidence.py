@@ -45,7 +45,7 @@ def _difference(cycle: CycleReport) -> float:
 
 
 def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
-    """Reasons why a gait cycle is unlikely to be one of this leg; empty if there are none.
+    """Reasons why a gait cycle is probably not from this leg; empty if there are none.
 
     Parameters
     ----------

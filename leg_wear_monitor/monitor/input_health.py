@@ -136,7 +136,7 @@ def unused(counts: Intake) -> int:
     return faulty + sum(int(getattr(counts, name)) for name in _DROPPED)
 
 
-# Sentences on unused samples: how many of how many, the fault, and the remedy.
+# Sentences on unused samples: their number, the fault, and the remedy.
 
 
 _WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
@@ -164,7 +164,7 @@ _STREAMS = {CRANK: "the crank", TORQUE: "drive_torque", LOAD: "foot_load"}
 
 
 def with_not_finite(before: Mapping[str, int], samples: Samples) -> Mapping[str, int]:
-    """Numbers of samples by stream that have a NaN or infinite value, with the numbers of more samples."""
+    """Number of samples per stream with a NaN or infinite value, after adding the given samples."""
     counts = Counter(before)
     for kind, name in _STREAMS.items():
         own = samples[samples["kind"] == kind]
@@ -200,8 +200,9 @@ def causes(
         for name in sorted(frequent, key=lambda name: -lost[name])
     ]
     unused = sum(lost.values())
-    if sentences and unused > max(lost.values()):  # one cause of several: else its number is taken for all
-        sentences[0] = f"{unused} of {received} samples are not used, {sentences[0]}"
+    # one cause of several; without the total, its number would be taken for the total
+    if sentences and unused > max(lost.values()):
+        sentences[0] = f"{unused} of {received} samples are not used; most frequent fault: {sentences[0]}"
     return sentences
 
 
@@ -290,7 +291,7 @@ class Stretch:
         cranks, torques = (within(part, 1, 2**63 - 1) for part in (of_crank(samples), of_torque(samples)))
         angle = np.unwrap(cranks["crank_angle_rad"], period=TURN)
         every = of_crank(samples)
-        different = np.unique(every[["stamp_ns", "crank_angle_rad"]])  # of two publishers, all are equal
+        different = np.unique(every[["stamp_ns", "crank_angle_rad"]])  # with two publishers, all are equal
         repeated = 1.0 - len(cranks) / max(1, len(different))
         return cls(
             crank_ns=cranks["stamp_ns"],
@@ -345,7 +346,7 @@ _MOVING_RAD, _STILL_RAD = 0.5, 1.0e-3  # turned in a stretch: the crank turns, i
 _SCATTERED, _SCATTERED_RAD = 0.12, 3.0e-3  # scatter of stamps: over the period, and times the crank's speed
 _COARSE = 0.2  # fraction of crank samples that repeat a stamp, by a coarse clock
 _HELD, _HELD_RAD = 2.5, 0.05  # samples that repeat a value, and the angle that the crank turns meanwhile
-_NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, of the predicted RMS
+_NO_VARIATION, _SWINGS = 1.0e-3, 0.5  # standard deviation of a torque, as a fraction of the predicted RMS
 _FROZEN = 0.2  # fraction of a gait cycle in which a torque that freezes has the same value
 _STEADY = 0.5  # largest relative difference of the speeds in two halves of a stretch
 _IN_TURNS = 0.1  # largest relative difference from the commanded speed, if in turns instead of radians
@@ -353,7 +354,7 @@ _AT_END, _BESIDE = 0.05, 4  # fraction of torques at the ends of a range; times 
 # fraction of torque samples that are outliers or no numbers: fewer are counted and left out, so many are a
 # fault until they are far fewer, because the time over which the next torque is a mean is not known
 _SPIKES, _FEWER_SPIKES = 0.05, 0.02
-_LEAST_SPIKES = 10  # fewer than that may come together by chance
+_LEAST_SPIKES = 10  # a smaller number may coincide by chance
 _ALIKE = 0.5  # correlation of torques over the crank angle
 _PHASES = (32, 16)  # phases of a gait cycle in which torques are compared
 _LEAST_A_PHASE = 2.0  # samples in each, on average
@@ -421,7 +422,7 @@ def _frozen_runs(torque: Floats) -> tuple[Ints, NDArray[np.bool_]]:
 
 
 def _constant(one: Stretch) -> Words | None:
-    """All torques, or a part of them in a row."""
+    """All torques, or a contiguous part of them."""
     ends, is_frozen = _frozen_runs(one.torque)
     if is_frozen.any():
         return {"size": amount(float(one.torque[ends[is_frozen.argmax()] - 1]), "N m")}
@@ -430,7 +431,7 @@ def _constant(one: Stretch) -> Words | None:
 
 
 def _saturated(one: Stretch) -> Words | None:
-    # a long run at the start or the end is of a sensor that was frozen before, or freezes
+    # a long run at the start or the end means that the sensor was frozen before, or freezes
     ends, is_frozen = _frozen_runs(one.torque)
     first, last = is_frozen[0] * ends[0], ends[-2] if is_frozen[-1] and len(ends) > 1 else ends[-1]
     torque = one.torque[first:last]
@@ -488,7 +489,7 @@ INPUT_RULES = (
         kind=CRANK,
         words=_frozen,
         needs_motion=False,
-        why="the crank has not moved since {since}, but the drive torque swings",
+        why="the crank has not moved since {since}, but the drive torque changes",
         do="check the crank's encoder and its driver; if the leg stands under a changing load, let it walk",
     ),
     InputRule(
@@ -521,7 +522,7 @@ INPUT_RULES = (
         code=JUMP,
         kind=CRANK,
         words=None,
-        why="the crank angle jumped by {size} at {since} and did not return: its zero is not known any more",
+        why="the crank angle jumped by {size} at {since} and did not return: its zero is no longer known",
         do="check the encoder for an overflow or lost counts, set crank.offset_rad again, and restart the "
         "monitor",
     ),
@@ -529,14 +530,14 @@ INPUT_RULES = (
         code=SPIKES,
         kind=TORQUE,
         words=_spikes,
-        why="{percent} % of the drive torques are spikes or no numbers since {since}" + _NO_JOINT,
+        why="{percent} % of the drive torques are spikes or NaN since {since}" + _NO_JOINT,
         do="check the cable of the torque sensor and its supply; publish a torque with each measurement only",
     ),
     InputRule(
         code="TORQUE_SATURATED",
         kind=TORQUE,
         words=_saturated,
-        why="{percent} % of the drive torques are at the end of their range since {since} ({size})"
+        why="{percent} % of the drive torques are at the end of the sensor's range since {since} ({size})"
         + _NO_JOINT,
         do="use a torque sensor with a wider range, or raise the limit of the driver",
     ),
@@ -544,7 +545,7 @@ INPUT_RULES = (
         code="TORQUE_CONSTANT",
         kind=TORQUE,
         words=_constant,
-        why="the drive torque does not change since {since}: it stays at {size}" + _NO_JOINT,
+        why="the drive torque has not changed since {since}: it stays at {size}" + _NO_JOINT,
         do="check drive_torque.source, its topic or axis, and the sensor; until then, rock the joints by "
         "hand regularly",
     ),
@@ -554,7 +555,7 @@ INPUT_RULES = (
         words=lambda one: (
             _held(one.torque, one.torque_ns, one.speed) if one.turned_rad > _MOVING_RAD else None
         ),
-        why="the drive torque changes with every {size}th sample only, at {rate} Hz: it is held in between"
+        why="the drive torque changes only with every {size}th sample, at {rate} Hz: samples are repeated"
         + _NO_JOINT,
         do="publish each torque once, with the stamp of its measurement; in a table, delete repeated values",
     ),
@@ -562,8 +563,8 @@ INPUT_RULES = (
         code=NOT_OF_GAIT,
         kind=TORQUE,
         words=None,
-        why="the drive torque does not follow the gait since {since}: it resembles neither the prediction "
-        "nor the previous step" + _NO_JOINT,
+        why="the drive torque has not followed the gait since {since}: it resembles neither the "
+        "prediction nor the previous step" + _NO_JOINT,
         do="check topic, unit and source of the drive torque; until then, rock the joints by hand regularly",
     ),
 )
@@ -654,7 +655,8 @@ _JUMP_RAD = 0.3  # deviation of an angle from a steady motion
 _JUMP_STEP_RAD = 0.2  # largest step of a crank between two samples over which a jump is known
 _AMONG = 5  # samples; two of them may be outliers
 _PERIODS = 4  # evaluation periods per stretch
-_KEPT_PERIODS = 12  # periods of kept samples: a gait cycle may be slower than commanded
+# number of periods whose samples are kept, because a gait cycle may be slower than commanded
+_KEPT_PERIODS = 12
 _AFTER = 3  # commanded gait cycles without a fault, after which it is over
 # Judgements before the fault has a name: outliers may come back, and an angle that is held or in a wrong unit
 # looks like a jump for a gait cycle; one strange step is no fault.

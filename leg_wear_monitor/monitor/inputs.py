@@ -93,7 +93,7 @@ SETTINGS = np.dtype(
     [
         ("gate", "f8"),  # largest difference of an angle from its series [rad]
         ("largest", "f8"),  # largest accepted speed [rad/s]
-        ("gap", "f8"),  # longest within a series [s]
+        ("gap", "f8"),  # longest gap within a series [s]
         ("alone", "f8"),  # time after which a missing series is forgotten [s]
         ("commanded", "f8"),  # speed [rad/s]
         ("torque", "f8"),  # RMS of the predicted drive torque [N m]
@@ -121,7 +121,7 @@ STATE = np.dtype(
         ("other_unit", "i8"),  # 1 if the unit is wrong
         # samples withheld
         ("conflicting", "i8"),  # samples withheld since two sources send
-        ("implausible", "i8"),  # samples withheld since the unit is wrong
+        ("implausible", "i8"),  # samples withheld because the unit is wrong
         ("torque_outliers", "i8"),
         # for the drive torque
         ("recent", "f8", (_RECENT,)),  # sizes of the last torques [N m]
@@ -328,8 +328,8 @@ class InputGuard:
         """Reason why crank samples are withheld at present, and the remedy; empty if none are."""
         if self.sources > 1:
             return (
-                "two sources of the crank angle disagree: two publishers of one crank, or an encoder that "
-                "jumps. Nothing is monitored until one source is left"
+                "two sources of the crank angle disagree: two publishers, or an encoder that jumps. "
+                "Nothing is monitored before one source remains"
             )
         ratio = self.speed_ratio
         if math.isnan(ratio):
@@ -337,6 +337,7 @@ class InputGuard:
         text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, so nothing is monitored: "
         if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
             return (
-                text + "it seems to be in degrees; publish radians, or set table.units.crank_angle of a table"
+                text
+                + "its unit seems to be degrees; publish radians, or set table.units.crank_angle of a table"
             )
         return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"

@@ -112,7 +112,7 @@ class MonitoredLeg(WearModel):
 
     @property
     def unmeasured(self) -> frozenset[str]:
-        """Alarms of the drive torque, if none came in the last gait cycle, or of values without a source."""
+        """Alarms of the torque if the last gait cycle had none, and alarms of values without a source."""
         is_gone = self.last is not None and not self.last.torque_samples
         silent = set(SEEN) - {each.shows for each in self.observers} | ({"torque"} if is_gone else set())
         alarms = self.evaluation.board.alarms.values()
@@ -231,11 +231,11 @@ class MonitoredLeg(WearModel):
         for each in self.observers:
             notes |= each.notes
         if self.guard.cause:
-            notes.pop(CRANK_ZERO, None)  # it cannot be found without valid samples
+            notes.pop(CRANK_ZERO, None)  # the monitor cannot find it without valid samples
         return notes
 
     def _other_cadence(self) -> tuple[str, ...]:
-        """Note that the leg walks at a wrong cadence: not if it only starts or stops, after a right one."""
+        """Note that the leg walks at a wrong cadence; a start or stop does not count."""
         last, cadence = self.last, self.config.cadence
         was_right = last is not None and cadence.allows(last.cadence_rpm)
         if self.twin.tracking is not Tracking.OUT_OF_STEP or was_right:
@@ -284,14 +284,14 @@ class MonitoredLeg(WearModel):
 
 
 def _alarm_value(joint: JointSituation, alarm: Alarm) -> KnownClearance | None:
-    """The clearance that its alarm is evaluated with at the end of a period; None to leave it as it is.
+    """The clearance for its alarm at the end of a period; None if the alarm stays unchanged.
 
     A modelled clearance is evaluated once per gait cycle, unless a different source keeps the alarm present.
     """
     known, sure, shown = judged(joint), surely_at(joint.limit_m, joint.seen), surest(joint.seen)
     if sure is not None and sure.clearance_m > known.clearance_m:
         return sure
-    # only the torque clears an estimate of the torque: a new run shows nothing for a while
+    # only the torque clears an estimate from the torque, because a new run has no estimate for a while
     is_back = shown is not None and _takes_back(shown, joint.limit_m)
     if is_observed(alarm, SEEN) and known.clearance_m < joint.limit_m and not is_back:
         return None

@@ -33,7 +33,7 @@ class Observer:
         """Stop simulating ahead: the process is about to end."""
 
     def begin_epoch(self) -> None:
-        """The stamps start again."""
+        """The stamps begin again at a new origin."""
 
     def passed(self, piece: Samples, ends_period: bool) -> Samples:
         """Samples that the twin may follow now; of those that are held back, see `unmonitored_s`."""
@@ -49,7 +49,7 @@ class Observer:
         """Add samples that the twin follows."""
 
     def end_cycle(self, statistics: CycleStatistics, is_refused: bool) -> None:
-        """Note a gait cycle that ended, before it is reported; ``is_refused``: its input has a fault."""
+        """Note the end of a gait cycle before it is reported; ``is_refused``: its input has a fault."""
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
         """Values of a gait cycle by the names of their alarms."""
@@ -82,7 +82,7 @@ class Observer:
 
     @property
     def leg_fields(self) -> Mapping[str, Any]:
-        """Fields of the state of the leg that are observed."""
+        """Fields of the state of the leg that the observer sets."""
         return {}
 
     @property

@@ -87,7 +87,7 @@ def undo_reset(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> JointW
 
 
 def _last_reset(accounting: Accounting, joint: str) -> tuple[Audit, JointWear]:
-    """The last reset of a joint, and its wear before; earlier events cannot be undone."""
+    """The last reset of a joint, and the wear before it; earlier events cannot be undone."""
     if accounting.ledger is None:
         raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
     own = [one for one in accounting.ledger.audits if one.joint and one.joint.name == joint]
@@ -135,7 +135,8 @@ def measure(
     is_ended = _compare(leg, joint, stamp_ns)
     was, now = (alarms[alarm_specs.CLEARANCE.name(joint)] for alarms in (before, board.alarms))
     if now.level < was.level or (now.acknowledged and not was.acknowledged):
-        accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))  # a withdrawal raises it again
+        # withdrawing the measurement raises it again
+        accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))
         found = attrs.evolve(found, eased=_eased(was, now))
     _note_clearance_verdict(leg, before, joint, stamp_ns, is_ended)
     renew_forecast(leg)  # without a remaining life, if the verdict rests on data that it does not use
@@ -162,7 +163,7 @@ def withdraw(leg: MonitoredLeg, number: int, stamp_ns: int, who: str) -> Measure
 
 
 def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ...]:
-    """The alarm that the first of the withdrawn measurements of a part eased, as it was before."""
+    """The alarm before the first withdrawn measurement of a part eased it."""
     part, ledger = (like.joint, like.replaced_ns), leg.accounting.ledger
     withdrawn = [one for one in leg.forecaster.measurements if one.is_withdrawn]
     stamps = {one.stamp_ns for one in withdrawn if (one.joint, one.replaced_ns) == part}
@@ -172,7 +173,7 @@ def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ..
 
 
 def _eased(was: Alarm, now: Alarm) -> str:
-    """Sentence on an earlier measurement's alarm that this measurement ends; empty without one."""
+    """Sentence on an earlier measurement's alarm that this measurement ends; empty without such an alarm."""
     if was.cause not in (MEASURED, BOTH):
         return ""
     if now.level < was.level:
@@ -204,7 +205,7 @@ def _note_alarms(leg: MonitoredLeg, stamp_ns: int) -> None:
 
 
 def _rested_on(alarms: Iterable[Alarm], joint: str, named: Iterable[str]) -> tuple[str, ...]:
-    """Names of the raised alarms that rested on the part of a joint that was replaced.
+    """Names of the raised alarms that the replaced part of a joint caused.
 
     The joint's own alarms; and the torque residual if this joint explains it: if its clearance was at a
     limit, or the verdict named it for its clearance.
@@ -252,7 +253,7 @@ def note_verdict(leg: MonitoredLeg, stamp_ns: int, milder: bool = True) -> None:
 def _note_clearance_verdict(
     leg: MonitoredLeg, before: Mapping[str, Alarm], joint: str, stamp_ns: int, is_ended: bool
 ) -> None:
-    """Bring the verdict up to date after a measurement, if the alarm of the clearance is or was raised."""
+    """Update the verdict after a measurement, if the alarm of the clearance is or was raised."""
     name = alarm_specs.CLEARANCE.name(joint)
     levels = {alarms[name].level for alarms in (before, leg.evaluation.board.alarms)}
     if leg.findings or levels != {Level.OK}:
@@ -301,4 +302,4 @@ def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:
 
 def wear_words(wear: JointWear) -> str:
     """Mean total wear of both surfaces, and its number of gait cycles."""
-    return f"{1e6 * wear.mean_m:.4g} um of wear from {wear.cycles} gait cycles"
+    return f"{1e6 * wear.mean_m:.4g} µm of wear from {wear.cycles} gait cycles"

@@ -68,7 +68,7 @@ class JointReport:
 
     @property
     def judged_clearance_m(self) -> float:
-        """Clearance that is compared with the limit: the modelled one, or a larger one by measurement."""
+        """Clearance to compare with the limit: the modelled clearance, or a larger measured clearance."""
         best_estimate_m = self.forecast.now_m if self.forecast else math.nan
         return judged_clearance_m(self.clearance_m, self.measured, best_estimate_m)
 

@@ -92,7 +92,7 @@ def _gait(leg: MonitoredLeg) -> Status:
     elif event and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {event.what.value.replace('_', ' ')}"
     if leg.config.wear_acceleration != 1.0:
-        message += "; wear is accelerated, this is a demonstration"
+        message += "; wear is accelerated for a demonstration"
     values = {
         "cadence_rpm": leg.twin.speed_radps * 30.0 / math.pi,
         "commanded_rpm": leg.config.cadence.commanded_rpm,
@@ -131,7 +131,7 @@ def _input(leg: MonitoredLeg) -> Status:
 
 
 def _code(evaluation: AlarmEvaluation, names: Iterable[str]) -> str:
-    """Code of the worst of some alarms."""
+    """Code of the worst alarm."""
     return worst_code(evaluation.board.alarms[name] for name in names)
 
 
@@ -173,19 +173,19 @@ def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
 
 
 def _with_measured(joint: Status, measured: Measurement | None) -> Status:
-    """A joint's status with its measured clearance next to the modelled one."""
+    """A joint's status with its measured clearance next to the modelled clearance."""
     if measured is None:
         return joint
     words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
     if not measured.counts:
-        words += " (contradicts the model, not in the forecast)"
+        words += " (contradicts the model, so the forecast does not use it)"
     words += f", {amount(joint.values['clearance_m'], 'm')} is modelled"
     values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 
 
 def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]) -> Status:
-    """A joint's status with its best estimate of the clearance, and with the verdict's findings on it."""
+    """Status of a joint, with its best estimate of the clearance and the findings of the verdict."""
     values, message = joint.values, joint.message
     if known.best_estimate_m is not None:
         values = {
@@ -199,7 +199,7 @@ def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]
     joint = attrs.evolve(joint, values=values, message=message)
     if not findings:
         return joint
-    # a finding counts that is worse than the joint's own alarms; of equals, one that asks to inspect or stop
+    # a finding must be worse than the joint's own alarms; an equal finding must ask to inspect or stop
     worst = max(findings, key=lambda finding: finding.state.severity)
     level, is_grave = level_of(worst), worst.state in (State.INSPECT, State.STOP)
     if level < joint.level or (level is joint.level and not is_grave):
@@ -233,10 +233,10 @@ def alarms_status(alarms: Iterable[Alarm]) -> Status:
 
 
 def _ledger(accounting: Accounting) -> Status:
-    """True if the wear is kept on the disk; ``not_kept_s``: walking that is not yet."""
+    """True if the wear is on the disk; ``not_kept_s``: time of walking that is not on the disk yet."""
     ledger = accounting.ledger
     if ledger is None:
-        return Status("ledger", Level.OK, "no ledger: wear is lost at the end", {})
+        return Status("ledger", Level.OK, "no ledger: the wear is lost when the monitor ends", {})
     values = {"not_kept_s": accounting.not_kept_s}
     if ledger.fault:
         message = f"not written: {ledger.fault}; trying again"
@@ -245,5 +245,5 @@ def _ledger(accounting: Accounting) -> Status:
         values["cut_off_s"] = ledger.cut_off_s
         message = "an earlier run was interrupted; the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values, LEDGER_INTERRUPTED)
-    message = "is written at the end of the recording" if ledger.at_end else "kept"
+    message = "will be written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

@@ -71,7 +71,7 @@ def torque_status(
     messages = []
     if alarm_specs.MISMATCH.name() in raised:
         by = f": {explanation(explained, diagnosis)}" if explained else ""
-        messages = [f"the measured torque differs from the predicted one{by}"]
+        messages = [f"the measured torque differs from the prediction{by}"]
         values |= _explained_values(explained) if explained else {}
         code = explained.named[0].cause.fault_code if explained and explained.named else code
     if causes is not None:  # those are estimates for the torque as received
@@ -79,7 +79,7 @@ def torque_status(
         past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in causes]
         messages += [f"the {alarm_specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
-        messages = ["not enough gait cycles yet for a comparison"]
+        messages = ["not enough gait cycles for a comparison yet"]
     return Status(
         "torque",
         level,
@@ -139,7 +139,7 @@ _STATES = {
     DiagnosisState.OFF: "off",
     DiagnosisState.WAITING: "waiting",
     DiagnosisState.AS_MODELLED: "the drive torque agrees with the modelled clearances",
-    DiagnosisState.CHANGED: "the drive torque shows a change",
+    DiagnosisState.CHANGED: "the drive torque indicates a change",
 }
 
 
@@ -154,12 +154,12 @@ def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
     if diagnosis.clearance_m and hidden:
         sentences.append(f"not observable: {', '.join(hidden)}")
     if diagnosis.bodies:
-        sentences.append("the model uses the masses, lengths and friction that the drive torque shows")
+        sentences.append("the model uses the masses, lengths and friction identified from the drive torque")
     return "; ".join(sentences)
 
 
 def unseen(diagnosis: Diagnosis, joints: Sequence[str]) -> tuple[str, ...]:
-    """Joints whose clearance the drive torque does not show."""
+    """Joints whose clearance cannot be estimated from the drive torque."""
     if not diagnosis.clearance_m:
         return tuple(joints)
     return tuple(

@@ -42,7 +42,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
 _LOG = logging.getLogger(__name__)
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
-ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
+ACCELERATED = "wear is accelerated, so clearances grow too fast to be estimated"
 _CONTRADICTS = 3.0  # standard deviations between the torque estimate and a measurement by an operator
 _FACTORS = (Cause.SCALE, Cause.SIGN)
 
@@ -122,7 +122,7 @@ class TorqueWatch(Observer):
             self.observer.leave()
 
     def begin_epoch(self) -> None:
-        """The stamps start again."""
+        """The stamps begin again at a new origin."""
         if self.observer:
             self.observer.begin_epoch()
 
@@ -174,13 +174,13 @@ class TorqueWatch(Observer):
         try:
             return explanation(self._leg.mechanism, cycles, self._allowed)
         except DATA_ERRORS as error:
-            self.unexplained = f"the torque mismatch has no explanation ({error or type(error).__name__})"
+            self.unexplained = f"the torque mismatch could not be explained ({error or type(error).__name__})"
             if self.unexplained != before:
                 _LOG.warning("%s", self.unexplained, exc_info=error)
             return None
 
     def end_period(self) -> None:
-        """Compare the torque with the torque of the model, and correct surely wrong modelled clearances."""
+        """Compare measured and modelled torque, and correct modelled clearances that are surely wrong."""
         torque, leg = self.observer, self._leg
         if torque is None:
             return
@@ -240,7 +240,7 @@ class TorqueWatch(Observer):
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """Clearances that the drive torque shows; empty while the received torque is wrong."""
+        """Clearances estimated from the drive torque; empty while the received torque is wrong."""
         if self.observer is None:
             is_on = self._leg.config.diagnosis.enabled
             return Diagnosis(reason=ACCELERATED if is_on else "diagnosis.enabled is false")
@@ -263,7 +263,7 @@ class TorqueWatch(Observer):
         )
 
     def _contradiction(self, change: Change) -> str:
-        """A measurement of the changed leg that contradicts the change of a clearance; empty without one."""
+        """A measurement of the changed leg that contradicts the change of a clearance, or empty."""
         if change.is_corrected or change.cause is not Cause.CLEARANCE:
             return ""
         k = self._leg.clearance_joints.index(change.subject)
@@ -277,7 +277,7 @@ class TorqueWatch(Observer):
         return (
             f"the drive torque ({estimate(change.value, change.sigma, 'm')}) and a measurement "
             f"({estimate(measured.clearance_m, measured.sigma_m, 'm')}) of joint {change.subject} disagree, "
-            "so its modelled clearance is not corrected: measure it again"
+            "so the modelled clearance is not corrected: measure again"
         )
 
     def _counted_bodies(self) -> tuple[Body, ...]:
@@ -372,7 +372,7 @@ class TorqueWatch(Observer):
 
     @property
     def statuses(self) -> Sequence[Status]:
-        """Comparison of measured and predicted torque, and clearances by the torque."""
+        """Comparison of measured and predicted torque, and clearance estimates from the torque."""
         diagnosis, causes = self.diagnosis, None if self.is_wrong else self.causes
         torque = torque_status(self._board, self._leg.last, self.record, self.explained, causes, diagnosis)
         return torque, diagnosis_status(self._leg.clearance_joints, diagnosis)

@@ -100,7 +100,7 @@ class WearModel:
         return self.forecaster.last_measured(self.accounting.replaced_ns)
 
     def correct(self, change: Change) -> None:
-        """Open a joint to the clearance that the drive torque shows, and count its wear from there."""
+        """Set a joint to the clearance estimated from the drive torque, and model its wear from there."""
         stamp_ns, joint = self.twin.intake.followed_stamp_ns, change.subject
         was = self.accounting.correct(joint, change.value)
         now = self.accounting.wear_of(joint)

@@ -159,8 +159,7 @@ class WearMonitor:
         verdicts: list[VerdictReport] = []
         states: list[VerdictReport] = []
         for received, ends_period in leg.evaluation_periods.pieces(samples):
-            # Guard: samples go on that were not counted before and come from one source, once the zero of the
-            # crank is known.
+            # Guard: passes on new samples from one source, once the zero of the crank is known.
             piece = leg.guard.checked(accounting.not_counted(received))
             for observer in leg.observers:
                 piece = observer.passed(piece, ends_period)
@@ -177,7 +176,8 @@ class WearMonitor:
             # Observers, report and alarms of each gait cycle that ended.
             cycles += [self._end_cycle(statistics, changes) for statistics in tracked.cycles]
             if ends_period:
-                # Alarms of the input and of clearances; only periods end alike however the stream is cut.
+                # Alarms of the input and of clearances; they change only at ends of periods, which do not
+                # depend on the blocks.
                 before = len(changes)
                 situation = self._end_period(changes)
                 # Verdict: the most severe rule that holds for this situation.
@@ -229,7 +229,8 @@ class WearMonitor:
         """Evaluate the input and the observers' results; returns the inputs of the verdict."""
         leg = self._leg
         if leg.judge.end_period(leg.guard.torque_outliers, bool(leg.guard.cause)):
-            # later gait cycles must not be compared with this torque; only periods end alike in all blocks
+            # later gait cycles must not be compared with this torque; only ends of periods do not depend on
+            # the blocks
             self._twin.forget_torque()
         is_refused = CRANK in leg.judge.trusted_before_ns
         self._take_changes(leg.evaluation.end_period(self._accounting.skipped, is_refused), changes)
@@ -312,17 +313,17 @@ class WearMonitor:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """Clearances that the drive torque shows; empty while the received torque is wrong."""
+        """Clearances estimated from the drive torque; empty while the received torque is wrong."""
         return self._leg.torque.diagnosis
 
     @property
     def lost(self) -> Lost:
-        """Samples and time that were not integrated so far."""
+        """Samples and time that were not modelled so far."""
         return self._accounting.lost(self._leg.guard)
 
     @property
     def used(self) -> dict[str, int]:
-        """How many samples of each kind were used so far, by the names of `twin.KINDS`."""
+        """Number of used samples of each kind so far, by the names of `twin.KINDS`."""
         return dict(self._twin.intake.used)
 
     @property
@@ -332,7 +333,7 @@ class WearMonitor:
 
     @property
     def walked(self) -> tuple[WalkedLoad, ...]:
-        """Walking since the start of the ledger, or of the run without one, by the foot load that acted."""
+        """Walking since the start of the ledger, or of a run without ledger, by the acting foot load."""
         return self._accounting.loads
 
     @property
@@ -362,7 +363,7 @@ class WearMonitor:
         return self._accounting.counted(samples)
 
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
-        """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
+        """Begin an epoch: the clock of the samples has restarted, and the following samples are new."""
         self._accounting.begin_epoch()
         for observer in self._leg.observers:
             observer.begin_epoch()
@@ -504,7 +505,7 @@ class WearMonitor:
         if ledger is None:
             raise LegWearError("no ledger is kept; set ledger.path")
         if not self._leg.keep():
-            raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
+            raise LegWearError(ledger.fault or "the ledger will be written at the end of the recording")
 
     def close(self) -> None:
         """Write the last entry, close the ledger, and stop simulating ahead.

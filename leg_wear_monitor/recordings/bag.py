@@ -79,7 +79,7 @@ class BagFile:
 
 
 def listed_recordings(given: Recordable | Iterable[Recordable]) -> list[Recordable]:
-    """Recordings that were given: one, or several."""
+    """The given recordings: one, or several."""
     if isinstance(given, str | os.PathLike | Mapping) or hasattr(given, "columns"):
         return [cast("Recordable", given)]
     return list(given)
@@ -110,7 +110,7 @@ def find_files(paths: Iterable[Recordable]) -> list[BagFile]:
             found = _directory(path) if path.is_dir() else [path]
             files += [BagFile(each, _storage(each), number) for each in found]
     if not files:
-        raise RecordingError("", "", f"no recording given, expected {_EXPECTED}")
+        raise RecordingError("", "", f"no recording is given. Expected {_EXPECTED}")
     return files
 
 
@@ -143,7 +143,7 @@ def _storage(path: Path) -> str:
 
 
 def _directory(path: Path) -> list[Path]:
-    """Files of a bag directory, by their numbers; one that is compressed as a whole is refused later."""
+    """Files of a bag directory, by their numbers; a compressed file is refused later."""
     files = [file for file in path.iterdir() if _NAME.fullmatch(file.name) and file.is_file()]
     files = files or list(path.glob("*.zstd"))
     if not files:
@@ -359,7 +359,7 @@ def _open(bag_file: BagFile, config: MonitorConfig, stack: ExitStack) -> OpenFil
         with system_asked(path, "cannot be read", error_of=RecordingError):
             if bag_file.storage in TABLES:
                 from leg_wear_monitor.recordings.table_file import (
-                    TableFile,  # pyarrow takes a quarter of a second
+                    TableFile,  # importing pyarrow takes a quarter of a second
                 )
 
                 is_file = bag_file.storage != IN_MEMORY

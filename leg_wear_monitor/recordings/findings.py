@@ -39,7 +39,7 @@ class Severity(Enum):
     """Effect of a finding on the result."""
 
     NOTE = "note"
-    """Worth knowing; all that was recorded is there."""
+    """A remark; nothing that was recorded is lost."""
     LOSS = "loss"
     """Something that was recorded is not in the result, or may be wrong in it."""
 

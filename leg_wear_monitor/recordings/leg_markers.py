@@ -25,7 +25,7 @@ LINKAGE = Output("~/linkage_states", encode.JOINT_STATE)
 SILENT_NS = 1_000_000_000  # samples apart by more: there was no current data
 _PERIOD_NS = 100_000_000
 _NEVER_NS = 2**63 - 1
-_STEPS = 180  # positions per turn; the nearest one is drawn
+_STEPS = 180  # positions per turn; the nearest position is drawn
 
 # Okabe and Ito's colours, because colour-blind people can distinguish them; the text has the levels as well
 _COLOURS = {Level.OK: (0.0, 0.45, 0.70), Level.WARN: (0.90, 0.62, 0.0), Level.ERROR: (0.84, 0.37, 0.0)}

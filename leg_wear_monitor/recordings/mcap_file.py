@@ -189,7 +189,7 @@ class McapFile:
                 continue
 
     def _add_message(self, one: _Segment) -> None:
-        """Add a message outside of chunks to the segment before it, if that is near and small."""
+        """Add a message outside of chunks to the preceding segment, if that is close and small."""
         last = self._segments[-1] if self._segments else one
         if last is not one and not last.is_chunk and one.at + one.stored - last.at <= _WINDOW:
             last.stored = one.at + one.stored - last.at

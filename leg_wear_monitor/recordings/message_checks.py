@@ -13,7 +13,7 @@ from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
 
 class _Fields:
-    """Reads the fields of a message one after the other, from the frame of its header on."""
+    """Reads the fields of a message in order, from the frame of its header on."""
 
     def __init__(self, raw: bytes) -> None:
         self._raw, self._at = raw, ENCAPSULATION + 8
@@ -53,7 +53,7 @@ def interfaces_in(raw: bytes) -> dict[str, list[str]]:
 
 
 def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
-    """Interfaces of the crank that are read, by the parameters that name them; empty names are not wanted."""
+    """Interfaces of the crank to read, by the parameters that name them; empty names are not read."""
     return {
         "drive_torque.interface": config.drive_torque.interface,
         "drive.temperature_interface": config.drive.temperature_interface,
@@ -84,19 +84,19 @@ def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> 
     raw : bytes
     joint : str
     interfaces : mapping of str to str
-        Wanted interfaces by the parameters that name them; an empty one is not wanted.
+        Interfaces to read, by the parameters that name them; an empty name is not read.
     """
     there = interfaces_in(raw)
     if joint not in there:
-        return f"no joint is named {joint!r}; there are {listed(sorted(there))}"
+        return f"no joint is named {joint!r}; the joints are {listed(sorted(there))}"
     absent = {key: name for key, name in interfaces.items() if name and name not in there[joint]}
     if not absent:
         return f"{joint} has no value of {' or '.join(filter(None, interfaces.values()))} yet"
     names, keys = " and ".join(map(repr, absent.values())), " and ".join(absent)
-    return f"{joint} has no interface {names}, it has {listed(sorted(there[joint]))}; set {keys}"
+    return f"{joint} has no interface {names}. It has {listed(sorted(there[joint]))}; set {keys}"
 
 
-# Check that the drive torque is about the axis that is read; otherwise report the axis that carries one.
+# Check that the drive torque is about the configured axis; otherwise report the axis that has a torque.
 
 
 _AXES = "xyz"
@@ -129,7 +129,7 @@ class WrenchAxis:
         del self._torques[:-_KEPT]
 
     def report(self) -> str:
-        """Report that a different axis carries the torque; empty if the axis that is read carries one."""
+        """Report that a different axis carries the torque; empty if the configured axis carries it."""
         if len(self._torques) < _LEAST:
             return ""
         with np.errstate(over="ignore", invalid="ignore"):  # a torque may be any finite number
@@ -140,6 +140,6 @@ class WrenchAxis:
             return ""
         # without values, because each change of a message adds a line to the log
         return (
-            f"the torque about {_AXES[self._axis]} does not change, the one about {_AXES[largest]} does; "
-            f"if that is the drive's, set drive_torque.axis to {_AXES[largest]}"
+            f"the torque about {_AXES[self._axis]} does not change, but about {_AXES[largest]} it does; "
+            f"if this is the drive torque, set drive_torque.axis to {_AXES[largest]}"
         )

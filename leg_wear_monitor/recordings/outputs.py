@@ -79,7 +79,7 @@ class Messages:
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages for reports but forecasts: samples, gait cycles, alarms, verdict and state."""
+        """All messages for reports except forecasts: samples, gait cycles, alarms, verdict and state."""
         yield from self._of_samples(reports.samples)
         for cycle in reports.cycles:
             yield self._clearance_states(cycle)

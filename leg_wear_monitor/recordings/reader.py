@@ -1,4 +1,4 @@
-"""Reads recordings, damaged ones too, as blocks of gait samples in log-time order, in bounded memory."""
+"""Reads recordings, even if damaged, as blocks of gait samples in log-time order, in bounded memory."""
 
 import heapq
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -229,10 +229,10 @@ class Pauses:
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
 
     def _report_inside(self, source: int, from_ns: int, to_ns: int) -> None:
-        """Report a pause, or a clock that was set: the times do not tell which."""
+        """Report a pause, or a clock that was set; the times cannot distinguish the two."""
         text = (
             f"has no samples for {amount(1.0e-9 * (to_ns - from_ns), 's')} after {time_words(from_ns)}: "
-            "the recording paused, or the clock was set; cadence and speed leave this time out"
+            "the recording paused, or the clock was set; cadence and speed ignore this time"
         )
         self.total_ns += to_ns - from_ns
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))
@@ -264,7 +264,7 @@ def clock_steps(path: Path, times_ns: NDArray[np.int64]) -> tuple[NDArray[np.boo
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
 _COMPARED = 100  # wrenches per file to compare the axes
-_FAR_NS = 1_000_000_000  # between header stamps and log times
+_FAR_NS = 1_000_000_000  # difference between header stamps and log times
 
 
 class Recording:

@@ -46,7 +46,7 @@ def replay(
     progress: Callable[[float], None] | None = None,
     finish: Callable[[ReplayResult], None] | None = None,
 ) -> ReplayResult:
-    """Replay a recording through the monitor.
+    """Run the monitor on a recording.
 
     Wear that the ledger contains already is not added again. If it covers the whole recording, the ledger and
     earlier reports stay unchanged.
@@ -127,7 +127,7 @@ def replay(
         mechanism = load_mechanism(config.mechanism)
         monitor = open_monitor(mechanism, config, at_end=True)
         stack.callback(monitor.abandon)
-        monitor.reports_states = out is not None  # otherwise the last one is enough
+        monitor.reports_states = out is not None  # otherwise the last value is enough
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
         part = None if out is None else stack.enter_context(_part(Path(out), recording.files))
@@ -137,7 +137,7 @@ def replay(
             _run(result, recording, sink, progress)
         if out is not None and part:
             place = Path(out) / REPORTS_FILE
-            if not (monitor.is_all_counted and place.exists()):  # keep earlier ones if these are empty
+            if not (monitor.is_all_counted and place.exists()):  # keep earlier values if these are empty
                 part.replace(place)
         result.findings = recording.findings + _about_the_ledger(result)
         result.is_partial = recording.is_partial
@@ -205,7 +205,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
         text = "everything in this recording is in the ledger already, so no wear was added"
         found.append(Finding(result.files[0], text, Severity.NOTE))
     elif result.monitor.already_counted_s > 0.0:
-        text = f"{result.monitor.already_counted_s:.4g} s of it are in the ledger already and were skipped"
+        text = f"{result.monitor.already_counted_s:.4g} s are in the ledger already and were skipped"
         found.append(Finding(result.files[0], text, Severity.NOTE))
     if result.monitor.config.ledger.path and result.is_unusable:
         path = Path(result.monitor.config.ledger.path)
@@ -235,7 +235,7 @@ def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
     """File for the reports, next to an earlier replay's reports, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
-        raise RecordingError(str(path), "", "is both read and written. Expected a different directory")
+        raise RecordingError(str(path), "", "is input and output at once. Expected a different directory")
     with system_asked(directory, "cannot be made", error_of=RecordingError):
         directory.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -291,7 +291,7 @@ class Sink:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        # report the original error, not one from closing the file
+        # report the original error, not an error from closing the file
         with suppress(RecordingError) if kind else nullcontext():
             self._writer.close()
 
@@ -305,7 +305,7 @@ class Sink:
             Stamp of the status [ns]; 0 if no time is known yet.
         """
         messages = self._messages
-        if stamp_ns > 0 and self._start:  # like the node, begin with all alarms, the verdict and the state
+        if stamp_ns > 0 and self._start:  # begin like the node, with all alarms, the verdict and the state
             alarms, report = self._start
             for one in (messages.alarms(alarms), messages.verdict(report), messages.state(report)):
                 self._write(attrs.evolve(one, stamp_ns=np.array([stamp_ns])))

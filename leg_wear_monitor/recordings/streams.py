@@ -56,7 +56,7 @@ class Stream:
 
 
 STREAMS = (
-    # also carries the angles of further encoders, and the torque if its source is the effort
+    # contains the angles of further encoders as well, and the torque if its source is the effort
     Stream(code=JOINT_STATE, topic="joint_states", type="sensor_msgs/msg/JointState", kind=CRANK,
            is_needed=True),
     Stream(code=WRENCH_STAMPED, topic="drive_torque", type="geometry_msgs/msg/WrenchStamped", kind=TORQUE,
@@ -171,7 +171,7 @@ _FURTHER = {
 @cache
 def types() -> "Typestore":
     """Types of ROS 2 Jazzy, and the types of ros2_control that the monitor reads."""
-    # recordings need them; a node without one does without rosbags, which no ROS package has
+    # only recordings need them; rosbags is not available as a ROS package
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -185,7 +185,7 @@ def definition(name: str) -> str:
     return types().generate_msgdef(name, ros_version=2)[0]
 
 
-# Times of forecast messages: a minute after the last one, after an alarm change, on a new answer.
+# Times of forecast messages: a minute after the last message, after an alarm change, on a new answer.
 
 
 _MINUTE_NS = 60 * 10**9

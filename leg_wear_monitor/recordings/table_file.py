@@ -92,7 +92,7 @@ class Column:
 
 
 def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
-    """Columns to read, the time first if there is one."""
+    """Columns to read; the time, if there is a column, comes first."""
     table, load = config.table, config.foot_load.source
     units = attrs.asdict(table.units)
     scales = {
@@ -394,7 +394,7 @@ def _regular(table: Table, line: _Ints, config: MonitorConfig) -> _Ints:
 
 
 def _checked(table: Table, column: Column, array: Any) -> Any:
-    """Cells of a column that have a type it may have; texts of numbers have decimal points."""
+    """Cells of a column with an accepted type; texts of numbers get decimal points."""
     if pa.types.is_null(array.type):
         array = array.cast(pa.float64())
     if pa.types.is_large_string(array.type):
@@ -457,7 +457,7 @@ def _stamps(array: Any, unit: str, table: tables.TableInput) -> tuple[_Ints, _Bo
 
 
 def _numpy(array: Any, nothing: float) -> NDArray[Any]:
-    """Values of numbers, `nothing` where one is null."""
+    """Values of numbers, with `nothing` for null."""
     return np.asarray(array.fill_null(nothing).to_numpy(zero_copy_only=False))
 
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.config.tables import COUNTS
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
 """Keys of columns: the last part of the parameters that name them."""
 
-_SEPARATORS = "\t;|, "  # if several fit, the first one wins: a comma may be a decimal mark
+_SEPARATORS = "\t;|, "  # if several fit, the first wins, because a comma may be a decimal mark
 _SAMPLE = 200  # lines
 
 
@@ -103,7 +103,7 @@ def _is_values(row: Sequence[str]) -> bool:
 
 
 def _first_values(rows: Sequence[list[str]], width: int) -> int:
-    """Place of the first row of numbers; without one, the place behind the first line with text."""
+    """Place of the first row of numbers, or the place after the first line with text."""
     found = (k for k, row in enumerate(rows) if len(row) == width and _is_values(row))
     return next(found, next((k + 1 for k, row in enumerate(rows) if any(row)), 0))
 
@@ -116,7 +116,7 @@ def _is_units(row: Sequence[str]) -> bool:
 def _names_before(lines: Sequence[str], rows: Sequence[list[str]], end: int, width: int) -> int | None:
     """The last line before the first row that has a name per column, or else the last line that has text.
 
-    A row may end with a separator, so it may have one cell more than there are names.
+    A row may end with a separator, so it may have one cell more than the names.
     """
     filled = [k for k in range(end) if any(rows[k])]
     fitting = [k for k in filled if len(_trimmed(rows[k])) in (width - 1, width)]

@@ -150,7 +150,7 @@ def _columns(names: Sequence[str]) -> Mapping[str, list[int]]:
 
 
 def _means(word: str, known: Sequence[str]) -> bool:
-    """True if a word is known, or ends with a known one, as the German Kurbelwinkel does."""
+    """True if a word is known or ends with a known word, like the German Kurbelwinkel."""
     return word in known or any(len(each) > 4 and word.endswith(each) for each in known)
 
 
@@ -217,7 +217,7 @@ def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Findi
                     ranges[key] = min(least, finite.min()), max(most, finite.max())
     stamps = np.concatenate(parts)
     seconds = 1.0e-9 * int(stamps[-1] - stamps[0])
-    rate = f", {(len(stamps) - 1) / seconds:.4g} rows a second" if seconds > 0.0 else ""
+    rate = f", {(len(stamps) - 1) / seconds:.4g} rows per second" if seconds > 0.0 else ""
     of = next((f"time {one}" for one in table.columns if one.key == STAMP), "no column of the time")
     lines = [f"table of {len(stamps)} rows over {seconds:.6g} s{rate}; {of}"]
     for column in table.columns:

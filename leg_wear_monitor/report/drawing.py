@@ -1,4 +1,4 @@
-"""The page of a mechanism: through its cycle, with its lengths to compare with their source."""
+"""The page of a mechanism: its motion, and its lengths for comparison with their source."""
 
 import math
 from itertools import combinations, cycle
@@ -27,7 +27,7 @@ CREATOR = "leg-wear-monitor draw"  # in the head of every drawing
 
 
 def first_position(reach: Reach) -> int:
-    """Position that is shown first: crank angle 0, or the dead point in the direction of the drive."""
+    """First position in the picture: crank angle 0, or the dead point in the direction of the drive."""
     if reach.turns or reach.open_joint or reach.low is None:
         return 0
     drive = reach.mechanism.drive

@@ -30,7 +30,7 @@ SMALL, USUAL = 8.0, 9.5  # font sizes in points
 
 
 def use_own_style() -> None:
-    """Draw with the defaults of matplotlib: a ``matplotlibrc`` in this directory could end a command."""
+    """Draw with the defaults of matplotlib, because a ``matplotlibrc`` here could stop a command."""
     matplotlib.rcdefaults()
 
 
@@ -49,7 +49,7 @@ def png(figure: Figure, dots_per_inch: float = 100.0) -> bytes:
 
 
 def plain(text: str) -> str:
-    """A name from a file as matplotlib writes it: on one line, and a dollar sign begins no formula."""
+    """A name from a file for matplotlib: on one line, with escaped dollar signs, which begin formulas."""
     return printable(text, 200).replace("$", r"\$")
 
 
@@ -83,12 +83,12 @@ _LENGTHS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
 
 
 def length_unit(greatest_m: float) -> tuple[float, str]:
-    """Factor from metres, and name, of the smallest unit that shows a length [m] below 1000."""
+    """The smallest unit that shows a length [m] below 1000: its factor from metres, and its name."""
     return next(((scale, unit) for scale, unit in _LENGTHS if scale * greatest_m < 1000.0), _LENGTHS[-1])
 
 
 def time_unit(longest_s: float) -> tuple[float, str]:
-    """Factor from seconds, and name, of a unit that shows a time [s] with a readable number."""
+    """A unit that shows a time [s] as a readable number: its factor from seconds, and its name."""
     if longest_s > 3.0 * 3600.0:
         return 1.0 / 3600.0, "h"
     return (1.0 / 60.0, "min") if longest_s > 300.0 else (1.0, "s")
@@ -98,13 +98,13 @@ def time_unit(longest_s: float) -> tuple[float, str]:
 
 
 def time_of(summary: ReplaySummary, stamps_ns: Ints) -> tuple[Floats, str]:
-    """Stamps (n,) [ns] as times since the recording's begin, and their unit, common to all of a recording."""
+    """Stamps (n,) [ns] as times since the start of the recording, and their common unit."""
     factor, unit = time_unit(summary.recording.duration_s)
     return np.asarray(factor * (stamps_ns - summary.recording.begin_ns) / 1.0e9, np.float64), unit
 
 
 def opened(summary: ReplaySummary) -> tuple[dict[str, Floats], str]:
-    """How much each clearance has opened since the first gait cycle, by joint, and the unit."""
+    """Growth of each clearance since the first gait cycle, by joint, and the unit."""
     columns = summary.history.modelled_m if len(summary.history.stamp_ns) else {}
     metres = {joint: values - values[0] for joint, values in columns.items()}
     scale, unit = length_unit(max((_greatest(values) for values in metres.values()), default=0.0))
@@ -181,7 +181,7 @@ def draw_life(axes: Axes, life: Life) -> None:
 def draw_clearances(
     axes: Axes, cycles: Floats, mean: Floats, largest: Floats, names: Sequence[str | None]
 ) -> None:
-    """Mean and dashed the largest clearance (n, k) of joints over the gait cycles (n,)."""
+    """Mean clearance and, dashed, largest clearance (n, k) of joints over the gait cycles (n,)."""
     for k, joint in enumerate(names):
         axes.plot(cycles, mean[:, k], color=_colour(k), label=joint)
         axes.plot(cycles, largest[:, k], color=_colour(k), ls="--", lw=0.7)

@@ -32,7 +32,7 @@ def fleet_page(
         Ids of the legs that have their own page.
     """
     rows = [_row(leg, _doubt(leg, now_ns, fresh_days), leg.id in pages) for leg in overview.legs]
-    rows.sort(key=lambda row: -row["state"].severity)  # stable: legs of one state stay in their order
+    rows.sort(key=lambda row: -row["state"].severity)  # a stable sort keeps the order of legs in one state
     last_ns = max((leg.last_ns for leg in overview.legs), default=0)
     summary = f"{len(rows)} legs, last recording {time_words(last_ns)}" if last_ns else "No recording"
     return Page(
@@ -48,7 +48,7 @@ def fleet_page(
 def _doubt(leg: LegOverview, now_ns: int, fresh_days: float) -> str:
     """Reason why the verdict of a leg is outdated; empty if it is current."""
     if leg.state is None:
-        return "the ledger has no recording of it"
+        return "the ledger has no recording of this leg"
     age_days = (now_ns - leg.last_ns) / DAY_NS
     if age_days < -1.0:  # clocks of two machines may differ by a time zone
         return "its last recording is dated in the future"
@@ -56,7 +56,7 @@ def _doubt(leg: LegOverview, now_ns: int, fresh_days: float) -> str:
 
 
 def _row(leg: LegOverview, doubt: str, has_page: bool) -> dict[str, Any]:
-    """A leg as the template needs it. A leg with an old recording is not monitored, whatever it was then."""
+    """A leg as the template needs it. A leg with an old recording is not monitored."""
     verdict = leg.state.verdict if leg.state else None
     state = verdict.state if verdict else State.NOT_MONITORED
     word = state.words if verdict else "no recording"

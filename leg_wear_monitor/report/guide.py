@@ -9,12 +9,12 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 _MEDIA = {".svg": "svg+xml", ".png": "png"}
-_OWN_HEADING = 2  # level of a page's sections: headings of a document inside it are below
+_OWN_HEADING = 2  # heading level of a page's sections; headings of a document inside it are one level below
 
 
 @lru_cache(maxsize=100)
 def enclosed(path: Path) -> tuple[str, str]:
-    """Title and markup of a document for a page that is a file, and may be anywhere.
+    """Title and markup of a document for a page that may be stored anywhere.
 
     The document contains no links to other documents.
     """

@@ -68,7 +68,7 @@ class Panel:
     height : int
         [CSS pixels].
     bands : sequence of pair of int
-        Numbers of the series above and below an area that is filled in the colour of the first.
+        Pairs of series; the area between both has the colour of the first series.
     """
 
     title: str
@@ -168,7 +168,7 @@ class Picture:
 
 @attrs.frozen(kw_only=True)
 class Gallery:
-    """Pictures of one kind side by side, as many in a row as fit, with a common caption."""
+    """Pictures of one kind with a common caption, in rows as wide as the page."""
 
     pictures: Sequence[Picture]
     caption: str = ""
@@ -256,7 +256,7 @@ _SPACES, _CODE = re.compile(r"[^a-z0-9]+"), re.compile(r"`([^`]+)`")
 
 @attrs.frozen
 class Section:
-    """A titled section of a page; a folded one shows its title alone until it is opened, or printed."""
+    """A titled section of a page; a folded section shows only its title until it is opened or printed."""
 
     title: str
     parts: Sequence[Part]
@@ -283,7 +283,7 @@ class Banner:
     severity : str
         Class of its colour: ``fine``, ``careful`` or ``bad``.
     links : mapping of str to pair of str
-        Text and address of a link behind some of the notes, by their titles.
+        Text and address of a link after a note, by the title of the note.
     """
 
     symbol: str
@@ -313,11 +313,11 @@ class Page:
         Further style sheets, and scripts that come before the interactive parts' scripts; by their names in
         ``report/templates``.
     has_dark : bool
-        True if it follows a reader who prefers dark colours; its pictures must follow as well.
+        True if page and pictures have dark colours for readers who prefer them.
     live : str
         Settings, as JSON, of the script that renews a page from its server; empty for a page that is a file.
     generator : str
-        Name of the program in the head of the page; none if empty.
+        Name of the program in the head of the page; no name if empty.
     """
 
     title: str
@@ -348,7 +348,7 @@ class Page:
     def policy(self) -> str:
         """Content security policy: these scripts run, no others, and nothing is fetched.
 
-        A live page hears from its own server only, and has no other style than its own.
+        A live page reads only from its own server, and has only its own style.
         """
         scripts = f"; script-src {_allowed(self.scripts)}" if self.scripts else ""
         if not self.live:
@@ -438,7 +438,7 @@ def reason(verdict: Verdict) -> str:
 
 
 def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
-    """A stamp, and when in the recording that was."""
+    """A stamp as a date, and as a time since the start of the recording."""
     begin, end = summary.recording.begin_ns, summary.recording.end_ns
     if not begin <= stamp_ns <= end:
         return time_words(stamp_ns)
@@ -446,7 +446,7 @@ def since_words(summary: ReplaySummary, stamp_ns: int) -> str:
 
 
 def is_of_recording(summary: ReplaySummary) -> bool:
-    """True if the verdict was known at the recording's end: nothing was measured or entered later."""
+    """True if nothing was measured or entered after the end of the recording."""
     return summary.verdict.since_ns <= summary.recording.end_ns
 
 

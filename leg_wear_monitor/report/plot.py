@@ -41,7 +41,7 @@ from leg_wear_monitor.wear import BUSHING, JOURNAL
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
 
-# A result, or a mechanism, on matplotlib's axes, for a notebook or a script to go on with.
+# A result, or a mechanism, on matplotlib axes, so that a notebook or a script can add to it.
 
 
 @singledispatch
@@ -158,7 +158,7 @@ def _plane(trace: Trace, name: str, kind: str, axes: Axes) -> Axes:
     for i, (axis, colour) in enumerate((("x", BLUE), ("y", VERMILION))):
         place, rate = joint.eccentricity_m[::step, i], joint.eccentricity_rate_mps[::step, i]
         axes.plot(1.0e3 * place, 1.0e3 * rate, color=colour, label=f"{name}, {axis}", **look)
-    axes.xaxis.set_major_locator(MaxNLocator(5))  # more labels run into each other at this width
+    axes.xaxis.set_major_locator(MaxNLocator(5))  # more labels would overlap at this width
     return _finished(axes, "eccentricity [mm]", "eccentricity rate [mm/s]")
 
 
@@ -224,7 +224,7 @@ def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
     return _finished(axes, "x [m]", "y [m]")
 
 
-_COLUMN_INCH = 3.6, 2.7  # column width of a paper: the fonts are as large in print as they are here
+_COLUMN_INCH = 3.6, 2.7  # column width of a paper, so that fonts keep their size in print
 _SCREEN_DPI = 150.0
 
 

@@ -104,8 +104,9 @@ def _question(results: StudyResults) -> list[Part]:
     ensemble = results.settings.ensemble
     text = (
         f"Each value is a mean over {ensemble.runs} runs with different initial crank angles and journal "
-        f"positions. Each run counts {ensemble.cycles} gait cycles after {ensemble.skip_cycles} cycles that "
-        "it does not count. Motion with clearance is chaotic, so a single run is only an example."
+        f"positions. The first {ensemble.skip_cycles} cycles of each run are skipped, "
+        f"and the next {ensemble.cycles} are used. Motion with clearance is chaotic, "
+        "so a single run is only an example."
     )
     joints = list(dict.fromkeys(name for point in results.points for name in point.settings["clearances"]))
     lacking = [joint for joint in joints if lacks_wear(results.mechanism.clearances[joint])]
@@ -216,7 +217,7 @@ def _force_table(found: Found) -> Table:
     ]
     note = (
         "Mean and standard deviation: largest forces and impacts over the cycles of all runs, the rest over "
-        "runs. A single largest force is a sample of a heavy tail; compare the percentile. A periodic force "
+        "runs. A single largest force is random; compare the percentile. A periodic force "
         "repeats to 100 %."
     )
     head = ["joint", *(title for title, _ in _FORCES.values())]
@@ -251,7 +252,7 @@ def _exponent_table(exponents: Found) -> Table:
         )
         grows = number(math.log(1000.0) / one.value) if one.value > 0.0 else "–"
         rows.append([point.label, f"{one.value:.2f} ± {one.error:.2f}", grows, f"{runs} × {cycles - FORGET}"])
-    head = ("", "exponent [1/cycle]", "cycles in which an error grows a thousandfold", "pairs × cycles")
+    head = ("", "exponent [1/cycle]", "cycles in which an error grows a thousand times", "pairs × cycles")
     note = "Mean and standard error over pairs of neighbours (Benettin and others 1980). Above 0: chaotic."
     return Table(caption="Largest Lyapunov exponent", head=head, rows=rows, note=note)
 
@@ -296,7 +297,7 @@ def _comparison(found: Found) -> Gallery:
 
 
 def _chart(found: Found, title: str, factor: float, lines: Mapping[str, Sequence[Spread | None]]) -> Picture:
-    """Means with bars; of each line a value, or None, for each point."""
+    """Means with bars; each line has one value, or None, per point."""
     axis, texts, figure = _axis(found), [], new_figure(4.6, 3.0)
     axes = figure.subplots()
     for k, (name, spreads) in enumerate(lines.items()):

@@ -46,7 +46,9 @@ from leg_wear_monitor.twin.sample import (
 class TruthConfig:
     """True values of the leg."""
 
-    path: str = described("JSON file for its true clearances, written at the end; none if empty", default="")
+    path: str = described(
+        "JSON file for the true clearances, written at the end; if empty, none is written", default=""
+    )
 
 
 @attrs.frozen(kw_only=True)
@@ -62,7 +64,10 @@ class PublisherConfig(GaitConfig):
     time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
     precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
-        "", "number of subscribers of each topic to wait for before the start", within=(0, 100), default=0
+        "",
+        "number of subscribers per topic that the node waits for before it starts",
+        within=(0, 100),
+        default=0,
     )
     truth: TruthConfig = described("true values of the leg", factory=TruthConfig)
 

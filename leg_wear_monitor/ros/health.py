@@ -120,7 +120,7 @@ class Silence:
         )
 
 
-# Alarms that need a clock or the ROS graph: a silent input, stamps of a time to come, several publishers.
+# Alarms that need a clock or the ROS graph: a silent input, stamps in the future, several publishers.
 
 
 AHEAD_FROM_S = 1.0  # larger than the usual clock differences within a network
@@ -183,7 +183,7 @@ class NodeAlarms:
 
 
 def with_worse(alarms: Iterable[_Alarm], own: Iterable[_Alarm]) -> tuple[_Alarm, ...]:
-    """Alarms, and own ones where there is none of that name or one of a lower level."""
+    """Alarms, plus those of the node that are missing in them or have a higher level."""
     named = {alarm.name: alarm for alarm in alarms}
     named |= {one.name: one for one in own if one.name not in named or one.level > named[one.name].level}
     return tuple(named.values())
@@ -197,7 +197,7 @@ _TURNED_BACK_S = 1.0
 
 
 def both_clocks(one: Status, other: Status) -> Status:
-    """Combine two statuses of the clock into one with the faults of either."""
+    """Combine two statuses of the clock into one status with both faults."""
     faults = [status for status in (one, other) if status.level is not Level.OK]
     message = "; ".join(fault.message for fault in faults) or one.message
     code = max(faults, key=lambda fault: fault.level).fault_code if faults else one.fault_code
@@ -239,7 +239,7 @@ class ClockMonitor:
         if ahead_s >= AHEAD_FROM_S:
             message = (
                 "the stamps of the samples are ahead of the node's clock: synchronise the clocks of both "
-                "computers; the monitor skips samples of this time later"
+                "computers; otherwise the monitor skips later samples"
             )
             return Status("clock", Level.WARN, message, values, alarms.STAMPS_AHEAD)
         return Status("clock", Level.OK, "goes on", values)
@@ -289,7 +289,7 @@ class Load:
         passed_ns, self._turn_ns = now_ns - (self._turn_ns or now_ns), now_ns
         if passed_ns < _LATE_NS:
             return 0
-        # it catches up as fast as samples come, at least
+        # the node processes at least as fast as samples arrive
         self._late_until_ns = now_ns + 2 * passed_ns + _CAUGHT_UP_NS
         self.worst_delay_s = max(self.worst_delay_s, 1.0e-9 * passed_ns)
         return passed_ns
@@ -299,7 +299,7 @@ class Load:
         return now_ns < self._late_until_ns
 
     def note_lost(self, lost: int, now_ns: int) -> None:
-        """Record how many messages were lost on the way so far; they are ours while the node is late."""
+        """Record the number of lost messages; while the node is late, they count as its own losses."""
         if self.is_late(now_ns):
             self.lost += lost - self.lost_before
         self.lost_before = lost
@@ -315,7 +315,7 @@ def load_status(load: Load, inbox: Inbox, is_recorded: bool = False) -> Status:
     dropped = inbox.shed + load.lost
     level, message, code = Level.OK, "keeps up", alarms.NO_FAULT
     if dropped > load.dropped_reported:
-        level, message = Level.ERROR, "overloaded: samples were dropped, and the model has no wear for them"
+        level, message = Level.ERROR, "overloaded: samples were dropped, and their wear is not modelled"
         code = alarms.SAMPLES_DROPPED
     elif load.worst_delay_s > COARSE_FROM_S:
         left = "published late" if is_recorded else "not published"
@@ -371,7 +371,7 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
         yield Level.ERROR, "has a publisher, but no message has arrived yet"
     if topic.lost > topic.lost_reported:
-        yield Level.WARN, "messages are lost on the way to this node"
+        yield Level.WARN, "messages are lost before they reach this node"
     if topic.without_crank:
         yield Level.ERROR, topic.without_crank
     if topic.other_axis:

@@ -129,8 +129,8 @@ _MOST_PUBLISHERS, _UNNAMED_OF_A_BLOCK = 8, 20
 class CrankNames:
     """Searches messages for the name of the crank joint.
 
-    Several nodes may publish joints of one robot on one topic: messages without the crank are a fault only
-    if none has it.
+    Several nodes may publish joints of one robot on one topic, so messages without the crank are a fault
+    only if no message has it.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class CrankNames:
     def report(self) -> str:
         """Report that no message since the last call named the crank, and which joints they named.
 
-        Empty if one named it; without any message, the report of the last call.
+        Empty if a message named the crank; without any message, the report of the last call.
         """
         named, unnamed = self._named, self._unnamed
         self._named, self._unnamed = 0, set()
@@ -172,13 +172,13 @@ class CrankNames:
             names = sorted({name for joints in unnamed for name in joints})
             again = next(filter(None, (twice(joints, self._crank) for joints in unnamed)), "")
             there = listed(names) if names else "too many to list"
-            text = f"no joint is named {self._crank!r}; there are {there}; set crank_joint to its name"
+            text = f"no joint is named {self._crank!r}; the joints are {there}; set crank_joint"
             self._report = again or text
         return self._report
 
 
 def _names(raw: bytes) -> tuple[str, ...]:
-    """Joint names of a message; none of a message with too many."""
+    """Joint names of a message; empty if there are too many."""
     return tuple(names_in(raw)) if len(raw) <= _MOST_BYTES else ()
 
 
@@ -204,7 +204,7 @@ class InterfaceNames:
             self._without = arrivals[without[-1]].raw if len(without) else b""
 
     def report(self) -> str:
-        """Report that the last messages lack an interface, and which there are; empty if they have them."""
+        """Report interfaces that the last messages lack, and those that exist; empty if none is missing."""
         if not self._without:
             return ""
         if len(self._without) > _MOST_BYTES:

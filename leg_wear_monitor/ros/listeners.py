@@ -1,4 +1,4 @@
-"""Listeners to a running monitor: of the dashboard, and of the demo."""
+"""Listeners to a running monitor, for the dashboard and the demo."""
 
 import json
 import threading
@@ -56,7 +56,7 @@ def full_name(node: str) -> str:
 
 
 def topics_of(node: str) -> list[str]:
-    """Topics that are listened to."""
+    """Topics to subscribe to."""
     return [topic_of(output, node) for output in _HEARD]
 
 
@@ -97,7 +97,7 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
 
 
 class _Listener(Node):
-    """Subscribes, and publishes and offers nothing."""
+    """Subscribes only; it publishes nothing and offers no service."""
 
     def __init__(self, context: Context, monitor: str, leg: LiveLeg) -> None:
         super().__init__(
@@ -131,7 +131,10 @@ class _Listener(Node):
     def _answered(self, future: Future) -> None:
         values = future.result().values if future.result() else []
         if len(values) != len(self._names):  # a different node or version
-            self._leg.take_setup(None, "The monitor's parameters cannot be read; give them by --config FILE.")
+            self._leg.take_setup(
+                None,
+                "The parameters of the monitor cannot be read; give its parameter file with --config FILE.",
+            )
             return
         given = {name: _plain(value) for name, value in zip(self._names, values, strict=True)}
         try:
@@ -150,12 +153,12 @@ def _plain(message: ParameterValue) -> Any:
 
 
 def _setup(given: dict[str, Any], monitor: str) -> LegSetup:
-    """The leg of a monitor's parameters; its mechanism is one of the package: no message names a file."""
+    """The leg of a monitor's parameters; it must be in the package, because messages may name no file."""
     config = config_from(given, monitor)
     if is_file_name(config.mechanism) or config.mechanism not in shipped_mechanisms():
         raise LegWearError(
-            f"the monitor has a mechanism of its own, {printable(config.mechanism)}; "
-            "give the parameter file of the monitor by --config FILE"
+            f"the monitor uses its own mechanism file, {printable(config.mechanism)}; "
+            "give the parameter file of the monitor with --config FILE"
         )
     return leg_setup(config, monitor)
 

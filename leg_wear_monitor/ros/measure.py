@@ -190,7 +190,7 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
     with _caller(Trigger, service, wait_s) as call:
         for _ in range(times):
             answer = call(Trigger.Request())
-            if answer.success:  # a different client may have asked for it just before
+            if answer.success:  # another client may have done it just before
                 break
     if not answer.success:
         raise LegWearError(f"{service}: {answer.message}")
@@ -199,7 +199,7 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
 
 @contextmanager
 def _caller(kind: Any, service: str, wait_s: float) -> Iterator[Callable[[Any], Any]]:
-    """A function that calls a service, from a node of its own.
+    """A function that calls a service from its own node.
 
     Raises
     ------
@@ -242,7 +242,6 @@ def _answer(node: Node, client: Any, service: str, wait_s: float, request: Any) 
     executor.shutdown()
     if not future.done():
         raise LegWearError(
-            f"{service}: no answer within {wait_s:g} s; whether it was done is not known: "
-            "see the log of the monitor"
+            f"{service}: no answer within {wait_s:g} s; the result is not known: see the log of the monitor"
         )
     return future.result()

@@ -49,15 +49,14 @@ from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 
 NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
-NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of something
+NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of a device
 
 UNDECIDED = (
-    "the ledger contains the time of these samples already, so they are skipped and nothing is monitored. "
-    "If they are simulated, set use_sim_time: true; "
-    "if their clock restarts with each start, set ledger.skip_counted: false; "
-    "if they are from a recording, use replay, or no ledger"
+    "the ledger contains the time of these samples already, so they are skipped and nothing is "
+    "monitored. For simulated samples, set use_sim_time: true; if the clock restarts with each start, "
+    "set ledger.skip_counted: false; for a recording, use replay, or no ledger"
 )
-BEGUN = "the clock of the samples has restarted: they begin a new epoch"
+BEGUN = "the clock of the samples has restarted: the ledger begins a new epoch"
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -217,7 +216,7 @@ class MonitorNode(ClosingNode):
         log.info(
             ledger
             if config.ledger.path
-            else "no ledger, because ledger.path is empty: the wear is lost at the end"
+            else "no ledger, because ledger.path is empty: the wear is lost when the monitor ends"
         )
         self._monitor.go_live()
         # until `close`: a signal may arrive before the caller of the constructor holds this node
@@ -329,7 +328,7 @@ class MonitorNode(ClosingNode):
                 topic.heard_ns, topic.heard_wall_ns = now_ns, newest.log_time_ns
 
     def _turn(self) -> int:
-        """Current time [ns] on a monotonic clock; inputs are not taken as silent while the node was late."""
+        """Current time [ns] on a monotonic clock; a late node does not count as a silent input."""
         now_ns = time.monotonic_ns()
         if late_ns := self._load.late_ns(now_ns):
             self._supervision.excuse(late_ns)
@@ -454,8 +453,10 @@ class MonitorNode(ClosingNode):
         alarms = alarm_words(*self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear"))
         self._send_state_and_forecast()
         fault = not_stored(self._monitor)
-        history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts it"
-        reply = f"joint {joint}: new surfaces{history}; alarms {alarms}; let the leg walk to confirm it"
+        history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts this"
+        reply = (
+            f"joint {joint}: new surfaces{history}; alarms {alarms}; let the leg walk to confirm the repair"
+        )
         return with_storage(reply, fault)
 
     def _undo_reset(self, joint: str) -> str:

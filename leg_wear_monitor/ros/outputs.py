@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 
-# The seconds around a STOP, in a recording of their own.
+# Separate recordings of the seconds around a STOP.
 
 
 _BEFORE_NS, _AFTER_NS = 30_000_000_000, 10_000_000_000
@@ -189,7 +189,7 @@ class BlackBox:
         self._with_writer(record)
 
     def stop(self, now_ns: int) -> None:
-        """Write the seconds around a STOP, where that is asked for."""
+        """Write the seconds around a STOP, if a directory is configured."""
         self._with_stops(lambda stops: stops.stop(now_ns))
 
     def flush(self) -> None:
@@ -204,7 +204,7 @@ class BlackBox:
         self._writer = None
 
     def _with_stops(self, use: Callable[[StopRecorder], None]) -> None:
-        """Use the recorder of stops, if there is one; a disk failure ends it, and not the monitor."""
+        """Use the recorder of stops, if there is one; a disk failure ends the recorder, not the monitor."""
         if self._stops is not None:
             try:
                 use(self._stops)
@@ -212,7 +212,7 @@ class BlackBox:
                 self.fault, self._stops = str(error), None
 
     def _with_writer(self, use: Callable[["McapWriter"], None]) -> None:
-        """Use the writer, if there is one; a disk failure ends the recording, and not the monitor."""
+        """Use the writer, if there is one; a disk failure ends the recording, not the monitor."""
         writer = self._writer
         if writer is not None:
             try:
@@ -238,7 +238,7 @@ def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapW
 def _move_aside(parameter: str, path: Path) -> Path | None:
     """Rename a file that is not empty by the time of its last change (UTC); its new name.
 
-    A restart with the same parameters must not delete the recordings of the former run.
+    A restart with the same parameters must not delete the earlier recordings.
     """
     try:
         if not path.is_file() or not path.stat().st_size:

@@ -37,7 +37,8 @@ _ARRAYS = (
 _CLOCK = "use_sim_time"
 _QOS_OVERRIDES = "qos_overrides."
 _MOST_DEPTH = 2**31 - 1  # limit of DDS
-_NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # YAML 1.1 reads it as text; Python prints 0.000001 like this
+# YAML 1.1 reads 1e-06 as text, and Python prints 0.000001 like this
+_NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")
 
 
 class ParameterNode(Node):
@@ -74,7 +75,7 @@ class ParameterNode(Node):
 
     @property
     def unused_qos(self) -> tuple[str, ...]:
-        """Given overrides of a quality of service that none of the topics so far has, which rclpy ignores."""
+        """Given overrides of a quality of service that fit no topic, which rclpy would ignore."""
         known = [name for name in self._parameters if name.startswith(_QOS_OVERRIDES)]
         return tuple(
             name + did_you_mean(name, known)
@@ -108,11 +109,11 @@ class ParameterNode(Node):
 
     @contextmanager
     def _qos_checked(self, topic: str) -> Iterator[None]:
-        """Name the parameters of a quality of service that cannot be used: rclpy names no value."""
+        """Name the parameters of an unusable quality of service, because the error of rclpy has no value."""
         of_topic = f"{_QOS_OVERRIDES}{self.resolve_topic_name(topic)}."
         given = {name: value for name, value in self.given.items() if name.startswith(of_topic)}
         for name, value in given.items():
-            # otherwise the middleware prints its own lines, and rclpy prints a signature
+            # otherwise the middleware and rclpy would print their own messages
             if name.endswith(".depth") and isinstance(value, int) and not 0 <= value <= _MOST_DEPTH:
                 fault = f"{value} is not from 0 to {_MOST_DEPTH} messages"
                 raise ConfigError(self.get_fully_qualified_name(), name, fault)
@@ -268,7 +269,7 @@ class Parameters(Generic[Config]):
 
 
 def _range(parameter: Parameter) -> dict[str, Any]:
-    """Field of a descriptor with the bounds of one number; without bounds, none.
+    """Bounds of one number for its descriptor; empty without bounds.
 
     A lower bound that is excluded is part of the range, which cannot exclude it; it is refused by the check.
     The step is 0, for any value between.
@@ -295,7 +296,7 @@ def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
         **_range(parameter),
     )
     if isinstance(value, tuple) and not value:
-        # rclpy treats an empty array as one of bytes; an unset parameter breaks every reply that contains it
+        # rclpy treats an empty array as bytes; an unset parameter breaks every reply that contains it
         kind = RosParameter.Type[parameter.type.upper()]
         node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
         node.set_parameters_atomically([RosParameter(parameter.name, kind, [])])

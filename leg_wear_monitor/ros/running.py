@@ -68,7 +68,7 @@ def repeated(report: Callable[[float], None], every_s: float = EVERY_S) -> Itera
 
 # The events executor needs a sixth of the default executor's time (docs/decisions/0007-live-node.md). Its
 # spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout:
-# until a future is done that never is, since spin_once() returns after each message.
+# with a future that is never done, because spin_once() returns after each message.
 # Jazzy has it since rclpy 7.1.4 of April 2025.
 _new_executor: Callable[..., Executor] | None = None
 with suppress(ImportError):
@@ -86,7 +86,7 @@ DONE, COULD_NOT = 0, 2
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-# Switch interval of the interpreter's lock, which each message takes. While a different thread prepares a
+# Switch interval of the interpreter's lock, which each message takes. While another thread prepares a
 # simulated leg, Python's default of 5 ms would let only 200 messages a second through.
 _SWITCH_S = 2.0e-4
 
@@ -131,7 +131,7 @@ def release_memory() -> None:
 
 
 def executor_for(node: Node) -> Executor:
-    """Executor for a node, not yet with it; the log says if it is not the events executor."""
+    """Executor without its node; the log says if it is not the events executor."""
     if _new_executor is not None:
         return _new_executor(context=node.context)
     node.get_logger().warning(_FORMER)
@@ -168,7 +168,7 @@ def _init(argv: list[str]) -> None:
 
 
 def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:
-    """Name parameter files and qualities of service that are not for a node: ROS ignores them silently."""
+    """Report parameter files and qualities of service that do not fit; ROS ignores them silently."""
     for fault in node.unused_qos:
         node.get_logger().warning(f"no topic of this node has the parameter {printable(fault)}")
     name = node.get_fully_qualified_name()

@@ -78,7 +78,7 @@ def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
     limit = "" if math.isnan(alarm.limit) else f", limit {amount(alarm.limit, alarm.unit)}"
     value = f"{amount(alarm.value, alarm.unit)}{limit}"
     time = f" at {health.utc(stamp_ns)}" if stamp_ns > 0 else ""
-    latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
+    latched = ", kept until it is acknowledged" if alarm.level > alarm.present else ""
     return f"alarm {alarm.name}: {before.name} -> {alarm.present.name} ({value}){time}{latched}"
 
 
@@ -106,14 +106,14 @@ class StatusLog:
             self._before[status.name] = now
 
 
-# A killed publisher stays in the graph until its lease expires (20 s by default): two publishers of one name
-# may be one that was restarted.
+# A killed publisher stays in the graph until its lease expires (20 s by default):two publishers with one
+# name may be a single restarted publisher.
 _SAME_NAME_S = 30.0
-# A node that has just come may still show by its first message that it publishes other joints than the crank.
+# A new node may publish other joints than the crank, which its first message shows.
 _NEW_S = 3.0
-_OTHERS_S = 60.0  # for which it is known, though it publishes seldom
-_OF_A_BLOCK = 4  # wrenches that are compared, so that this costs little
-# rules of the verdict that a torque about a different axis can be the cause of
+_OTHERS_S = 60.0  # time that a publisher stays known, because some publish rarely
+_OF_A_BLOCK = 4  # number of compared wrenches, to limit the cost
+# rules of the verdict that a torque about a wrong axis can trigger
 _OF_AXIS = (
     "TORQUE_CONSTANT", "FRICTION_CHANGED", "LOAD_NOT_OBSERVED", "MECHANISM_CHANGED", "TORQUE_BIAS",
     "TORQUE_MASS", "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_TIMING",
@@ -264,7 +264,7 @@ class Supervision:
             alarms_status(self._alarms.beside(self._monitor.alarms).alarms),
         ):
             given[own.name] = own
-        # the given clock status has already been logged at its source
+        # the source has already logged the given clock status
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
         given[clock.name] = health.both_clocks(given[clock.name], clock) if clock.name in given else clock
         return self._silence.marked((*given.values(), topics), now_ns)

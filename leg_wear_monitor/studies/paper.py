@@ -1,6 +1,6 @@
 """The claims of the paper's sections 6 and 7 that statistics of the leg can test, in our words.
 
-The text of the paper was not at hand: the claims are as readers of the paper handed them on.
+We had no access to the paper; readers of the paper passed on its claims.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,15 +26,15 @@ Measure = Callable[[Responses], Estimate]
 """Measure of a claim, above 0 where the claim holds: the logarithm of a ratio, or a difference."""
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
-STANDARD_ERRORS = 3.0  # a measure within so many of its standard errors decides nothing
-_TINY = 1.0e-300  # in place of a mean of 0, such as of impacts that do not occur
+STANDARD_ERRORS = 3.0  # a measure below this number of standard errors decides nothing
+_TINY = 1.0e-300  # replaces a mean of 0, for example if there are no impacts
 _SUM_WITHIN = 0.1  # deviation up to which the combined effect counts as the sum
 _REGULAR = 0.5  # fraction of a force's variance above which it counts as regular: most repeats
 
 
 @attrs.frozen
 class Claim:
-    """A claim: where the clearances are, its text, and its measure."""
+    """A claim: the joints with clearance, its text, and its measure."""
 
     place: str
     text: str
@@ -55,7 +55,7 @@ def responses_of(found: Found) -> Responses | None:
 
 
 def of_runs(responses: Responses, name: str, where: Names, joint: str = "") -> Floats:
-    """A statistic (r,) of the leg in every run with clearance there; of a joint, if it has one.
+    """A statistic (r,) of the leg, or of a joint if one is given, in every run with these clearances.
 
     NaN for wear that is not modelled, for example without a wear coefficient.
     """
@@ -79,7 +79,7 @@ def of_runs(responses: Responses, name: str, where: Names, joint: str = "") -> F
 
 
 def log_ratio(x: Floats, y: Floats, paired: bool) -> Estimate:
-    """Logarithm of mean x over mean y, (r,) each; ``paired`` if they are of the same runs."""
+    """Logarithm of mean x over mean y, (r,) each; ``paired`` if both are from the same runs."""
     mean_x, mean_y = np.maximum(x.mean(), _TINY), np.maximum(y.mean(), _TINY)
     return _measured(float(np.log(mean_x / mean_y)), x / mean_x, y / mean_y, paired)
 
@@ -90,14 +90,14 @@ def difference(x: Floats, y: Floats, paired: bool = True) -> Estimate:
 
 
 def _measured(value: float, x: Floats, y: Floats, paired: bool) -> Estimate:
-    """A measure with the standard error of a difference of means; 0, which decides nothing, if unknown."""
+    """A measure with the standard error of a difference of means; unknown: 0, which decides nothing."""
     variance = np.var(x - y, ddof=1) if paired else np.var(x, ddof=1) + np.var(y, ddof=1)
     error = float(np.sqrt(variance / len(x)))
     return Estimate(value, error) if np.isfinite(value) else Estimate(0.0, 0.0)
 
 
 def _weakest(effects: list[Estimate]) -> Estimate:
-    """The condition that holds by least: a claim with several conditions needs all of them."""
+    """The condition with the smallest margin, because a claim needs all of its conditions."""
     return min(effects, key=lambda effect: effect.value)
 
 
@@ -122,7 +122,7 @@ def _in_one(name: str, where: Names, *pairs: str) -> Measure:
 
 
 def _with_all(name: str, joints: str, place: Names) -> Measure:
-    """A statistic of these joints is greater with all five clearances than with the place alone."""
+    """A statistic of these joints is greater with all five clearances than with their place alone."""
     return _above(name, *((ALL, joint, place, joint) for joint in joints))
 
 
@@ -166,7 +166,7 @@ def _apart_from_sum(leg: Responses) -> Estimate:
 
 
 def _zones(leg: Responses, one: tuple[Names, str], other: tuple[Names, str]) -> tuple[Floats, Floats]:
-    """How far the middles of two zones are from each other, and half of their widths together [turns]."""
+    """Distance between the middles of two zones, and half of the sum of their widths [turns]."""
     middles = of_runs(leg, "zone_centre_deg", *one), of_runs(leg, "zone_centre_deg", *other)
     between = np.abs((middles[0] - middles[1] + 180.0) % 360.0 - 180.0)
     reach = 0.5 * (of_runs(leg, "zone_deg", *one) + of_runs(leg, "zone_deg", *other))
@@ -174,7 +174,7 @@ def _zones(leg: Responses, one: tuple[Names, str], other: tuple[Names, str]) -> 
 
 
 def _stays(leg: Responses) -> Estimate:
-    """B's zones, alone and with all five, lie over each other: their middles are nearer than half widths."""
+    """B's zones, alone and with all five, overlap: their middles are closer than half of their widths."""
     between, reach = _zones(leg, (HIP, "B"), (ALL, "B"))
     return difference(reach, between)
 
@@ -225,13 +225,13 @@ CLAIMS = (
     Claim("all five", "J wears less deeply than with the foot alone", _above(DEPTH, (FOOT, "J", ALL, "J"))),
     Claim(
         "all five",
-        "G wears less deeply than A and B, deeper than I and J",
+        "G wears less deeply than A and B, but deeper than I and J",
         _in_one(DEPTH, ALL, "AG", "BG", "GI", "GJ"),
     ),
     Claim("all five", _REPEATS_LESS, _repeats(ALL, "ABG", "IJ")),
     Claim("each", _ZONES_WIDEN, _above("zone_deg", (KNEE, "G", HIP, "B"), (FOOT, "I", KNEE, "G"))),
     Claim("all five", "B's zone stays where it is with the hip alone", _stays),
-    Claim("foot", "the zones of I and J have nothing in common", _differ),
+    Claim("foot", "the zones of I and J do not overlap", _differ),
     Claim(
         "all five", "the zone with half of the wear is wider for A than for B", _in_one("zone_deg", ALL, "AB")
     ),

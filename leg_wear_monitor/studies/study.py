@@ -26,7 +26,7 @@ _MOST = 1_000_000  # largest number of runs, cycles or points
 def _rising(values: tuple[float, ...]) -> str | None:
     if all(a < b for a, b in pairwise(values)):
         return None
-    return f"{list(values)} does not rise from value to value"
+    return f"{list(values)} does not increase from value to value"
 
 
 def _distinct(names: Names) -> str | None:
@@ -55,7 +55,7 @@ class Ensemble:
 
     runs: int = _count("runs with different initial conditions", within=(2, _MOST), default=12)
     cycles: int = _count("gait cycles of each run that the results use", within=(2, _MOST), default=20)
-    skip_cycles: int = _count("gait cycles before them", within=(0, _MOST), default=3)
+    skip_cycles: int = _count("gait cycles before these", within=(0, _MOST), default=3)
     traced_cycles: int = _count(
         "gait cycles of each run whose curves are stored", within=(1, _MOST), default=5
     )
@@ -69,7 +69,7 @@ class Ensemble:
     def __attrs_post_init__(self) -> None:
         if self.traced_cycles > self.cycles:
             raise FieldError(
-                "traced_cycles", f"{self.traced_cycles} is more than the {self.cycles} cycles counted"
+                "traced_cycles", f"{self.traced_cycles} is more than the {self.cycles} cycles of a run"
             )
 
 
@@ -78,7 +78,9 @@ class ExponentSettings:
     """How the largest Lyapunov exponent is measured."""
 
     runs: int = _count("pairs of neighbours with different initial conditions", within=(2, _MOST), default=4)
-    cycles: int = _count("gait cycles over which neighbours are followed", within=(10, _MOST), default=100)
+    cycles: int = _count(
+        "gait cycles over which the distance of neighbours is followed", within=(10, _MOST), default=100
+    )
     renewals: int = _count(
         "renormalisations of the distance per cycle, a power of 2",
         within=(1, SAMPLES),
@@ -102,7 +104,7 @@ class SectionSettings:
     """How long the motion is observed once per gait cycle."""
 
     cycles: int = _count("gait cycles of the section, one point per cycle", within=(2, _MOST), default=60)
-    skip_cycles: int = _count("gait cycles before them", within=(0, _MOST), default=20)
+    skip_cycles: int = _count("gait cycles before these", within=(0, _MOST), default=20)
     portrait_cycles: int = _count("gait cycles of a phase portrait", within=(0, 100), default=0)
     crank_angle_deg: float = quantity("deg", "crank angle of the section", within=(0.0, 360.0), default=0.0)
 
@@ -162,7 +164,7 @@ class Sweep:
     friction: Names = described("laws of friction", default=(), check=_some_of(FRICTION_LAWS))
     friction_coefficient: tuple[float, ...] = _values("", "friction coefficients", within=(0.0, 2.0))
     keep: Names = described(
-        f"results to keep of each point: {', '.join(TASKS)}",
+        f"results to store for each point: {', '.join(TASKS)}",
         default=("response",),
         check=_some_of(tuple(TASKS)),
     )
@@ -185,7 +187,7 @@ class Study:
     question: str = described("question that the study answers")
     mechanism: str = described("a mechanism that comes with the package, or a file", default="bionic_leg")
     clearances: Names = described(
-        "joints with clearance, where no sweep varies them", default=(), check=_distinct
+        "joints with clearance, unless a sweep varies them", default=(), check=_distinct
     )
     clearance_m: float = quantity(
         "m", "radial clearance of these joints", within=(1.0e-6, 0.1), default=3.0e-4
@@ -196,7 +198,7 @@ class Study:
         within=(0.1, 10_000.0),
         default=60.0,
     )
-    sweeps: tuple[Sweep, ...] = described("settings that vary, one after the other")
+    sweeps: tuple[Sweep, ...] = described("settings that vary, one at a time")
     ensemble: Ensemble = described("the runs of each point", factory=Ensemble)
     exponent: ExponentSettings = described("the Lyapunov exponent", factory=ExponentSettings)
     section: SectionSettings = described("Poincaré section of each value", factory=SectionSettings)

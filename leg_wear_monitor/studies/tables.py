@@ -20,7 +20,8 @@ TITLES = ("toe displacement", "toe velocity", "toe acceleration", "drive torque"
 # wear depth, and normal force times sliding distance: by Archard's law the worn volume is proportional to it
 DEPTH, ARCHARD = "wear_depth_m_per_cycle", "archard_integral_j_per_cycle"
 FORGET = 3  # skipped first cycles of an exponent: neighbours turn into the fastest growing direction
-_OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")  # others: of clearance joints
+# other statistics exist for clearance joints only
+_OF_ALL_JOINTS = ("peak_force_n", "mean_force_n", "rms_force_n", "p99_force_n")
 
 
 @attrs.frozen
@@ -103,8 +104,7 @@ def worst_zone(arrays: Arrays, joint: str, fraction: float) -> tuple[float, floa
 def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
     """Lyapunov exponent from the growth factors of independent runs, with its standard error.
 
-    The standard error is the larger one of those over runs and over steps, because few runs may agree by
-    chance.
+    We take the larger standard error of runs and steps, because few runs may agree by chance.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ TABLES: dict[str, tuple[str, Callable[[Found], Columns]]] = {
 
 
 def _settings(points: Sequence[Point]) -> Columns:
-    """Label and settings of each row's point; None where a point keeps the mechanism's own value."""
+    """Label and settings of each row's point; None if a point keeps the value of the mechanism file."""
     return {
         "point": [point.label for point in points],
         "clearances": [", ".join(point.settings["clearances"]) for point in points],

@@ -44,8 +44,8 @@ ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_
 # Sampling grid of the studies.
 
 
-# samples per gait cycle: equal crank steps from angle 0, at whole intervals of the stepper; with 512, a
-# portrait is a polygon
+# samples per gait cycle: equal crank steps from angle 0, at whole intervals of the stepper; with only 512, a
+# portrait would look like a polygon
 SAMPLES, PORTRAIT_SAMPLES = 512, 2048
 
 
@@ -81,7 +81,7 @@ class ObservedLeg:
         self._period = TURN / abs(setup.speed)
 
     def advance(self, steps: int, statistics: RunStatistics, samples: int = SAMPLES) -> None:
-        """Advance by a number of steps, of so many per gait cycle, and add to the run statistics.
+        """Advance by a number of steps, with a given number per gait cycle, and add to the run statistics.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class ObservedLeg:
 
 
 def changed(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism under the point's force of the ground and with its friction, where the point has them.
+    """The mechanism with the point's ground force and friction, if it has them.
 
     0 N replaces a load of the ground that the mechanism file has.
     """
@@ -180,7 +180,7 @@ def observed_legs(legs: list[Leg], tolerance_m: float | None = None) -> list[Obs
 
 
 def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
-    """Prepare one leg of every setting, equal ones once, so that errors are reported before any computation.
+    """Prepare one leg per distinct setting, so that errors are reported before any computation.
 
     Raises
     ------
@@ -266,7 +266,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
         peaks.append(statistics.peak.copy())
         impacts.append(statistics.impacts.copy())
         statistics.response[:], statistics.peak[:] = 0.0, 0.0
-    statistics.peak[:] = np.max(peaks, axis=0)  # of the whole run, which bounds its percentiles
+    statistics.peak[:] = np.max(peaks, axis=0)  # largest value of the whole run, which bounds its percentiles
     found = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
     member = {f"error_{name}": np.array(largest)[:, i] for i, name in enumerate(ERRORS)}
     member |= {name: _known(found.values(), name) for name in _FIGURES}
@@ -405,7 +405,8 @@ def stretches(
         state, near = advance(state), advance(near)
         gap = (near[counts] - state[counts]) / unit
         size = float(np.linalg.norm(gap))
-        if size == 0.0:  # equal in all bits: take the smallest distance that the numbers resolve
+        # both are equal in all bits, so we take the smallest distance that the numbers resolve
+        if size == 0.0:
             gap, size = offset, np.finfo(float).eps
         logs[step] = np.log(size / last)
         last = size

@@ -36,7 +36,7 @@ STEP = np.dtype(
         ("end_ns", "i8"),  # stamp at which it ends
         ("detail", "i8"),  # EVALUATE: kind of the sample; LEAVE: reason; REPORT: event
         ("turns", "i8"),  # whole crank turns to add to the angle of the motion
-        ("bridged_ns", "i8"),  # part of its duration that bridges a gap
+        ("bridged_ns", "i8"),  # part of the duration that bridges a gap
         ("torque", "f8"),  # drive torque measured at a sample [N m]
         # START: angle [rad], speed, acceleration; MOVE: coefficients over time [s]; PUSH: force x and y [N]
         ("motion", "f8", (6,)),
@@ -95,7 +95,7 @@ def _nanoseconds(time_s: float) -> int:
 
 
 # Constants of the tracker. Noise refers to 200 Hz; only the ratio of both noises and, for the gate, the first
-# one have an effect.
+# noise have an effect.
 ANGLE_NOISE, VELOCITY_NOISE = (sigma**2 * (1.0 / 200.0) for sigma in (1.0e-3, 0.05))  # rad^2 s, rad^2/s
 VELOCITY_GATE = 0.5  # rad/s, as `GATE_RAD` of the angle
 MARK_GAP_NS = 50_000_000  # shortest gap that is counted
@@ -173,7 +173,7 @@ TRACKER_CLOCK = np.dtype(
         ("turns", "i8"),  # whole crank turns, counted separately
         ("velocity_credit", "i8"),  # successive velocities that agreed with the angles
         ("period_ns", "i8"),  # shortest recent time between crank samples
-        ("foot_force", "f8"),  # largest one of the foot load that a neighbour has, too, in recent turns [N]
+        ("foot_force", "f8"),  # largest foot load that two neighbouring samples share in recent turns [N]
     ]
 )
 
@@ -181,7 +181,7 @@ _ESTIMATE = [
     ("angle", "f8"),  # crank angle [rad]
     ("speed", "f8"),  # [rad/s]
     ("acceleration", "f8"),  # [rad/s^2]
-    # covariances of the three
+    # covariances of angle, speed and acceleration
     ("p00", "f8"),  # angle [rad^2]
     ("p01", "f8"),  # angle and speed [rad^2/s]
     ("p02", "f8"),  # angle and acceleration [rad^2/s^2]
@@ -215,7 +215,7 @@ TRACKER_STATE = np.dtype(
         ("clock", TRACKER_CLOCK),
         ("estimate", CRANK_ESTIMATE),  # after the last sample
         ("node", SPLINE_NODE),  # the last spline node, which the leg has reached
-        ("ahead", SPLINE_NODE),  # the next one, during its computation
+        ("ahead", SPLINE_NODE),  # the next piece, during its computation
         ("candidate", GAIT_SAMPLE),  # sample that may begin a new time base, stamp 0 if there is none
     ]
 )
@@ -413,9 +413,9 @@ def _apart(one, other):
 
 @kernel
 def judge_load(state, sample):
-    """Judge the last queued sample of the foot load by the one before it and by the next one.
+    """Judge the last queued sample of the foot load by its two neighbours.
 
-    An outlier is counted, and gets the force between the other two.
+    An outlier is counted, and gets the force between both neighbours.
     """
     clock, queue, at, before = state.clock, state.queue, -1, -1
     for j in range(clock.tail - 1, clock.head - 1, -1):
@@ -510,7 +510,7 @@ def _drop_turns(state):
 
 @kernel
 def _evaluate_speed(model, clock, stamp, speed):
-    """Update the tracking state by the time for which the speed has been within tolerance or beyond."""
+    """Update the tracking state from the time that the speed was within or beyond the tolerance."""
     within = 1 if model.slowest <= abs(speed) <= model.fastest else 0
     if clock.tolerance_since_ns == 0 or within != clock.in_tolerance:
         clock.tolerance_since_ns, clock.in_tolerance = stamp, within

@@ -129,7 +129,7 @@ class LoadEstimate:
 
     @property
     def room(self) -> tuple[float, float]:
-        """Least and largest possible load minus the acting one [N]."""
+        """Least and largest possible load minus the acting load [N]."""
         return LOADS_N[0] - self.acting, LOADS_N[1] - self.acting
 
     def take(self, found: Floats, sigma: Floats, acts: bool) -> None:
@@ -200,7 +200,7 @@ def torque_statistics(sums: Record, settled: LoadEstimate, unexplained_nm: float
 
 
 def torque_profile(sums: Record, acting_n: float) -> TorqueProfile:
-    """Torques of a cycle by phase; ``acting_n`` is the foot load that acted in the model [N]."""
+    """Torques of a cycle by phase; ``acting_n`` is the foot load in the model [N]."""
     number, angle, measured, predicted, lever = sums.profile.copy()
     return TorqueProfile(number, angle, measured, predicted - acting_n * lever, lever)
 
@@ -356,7 +356,7 @@ def averages_by_phase(
 ) -> Floats:
     """Sums (6, n) of a gait cycle of averages for `RepeatingResidual`.
 
-    Each sample counts by the time that it stands for: where some are lost, the others weigh alone. Weights
+    Each sample is weighted by its duration, so lost samples have no weight. Weights
     decrease with the time to a sample as exp(-cutoff t): as the two stages of the low-pass filter, without
     their delay.
 

@@ -67,7 +67,8 @@ _CUTOFF = TURN * 10.0  # rad/s: of the low-pass filter of measured and predicted
 _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
-_MAX_FRICTION = 0.3  # of the RMS torque: joints and gears lose some tenths; a larger constant is a bias
+# fraction of the RMS torque: joints and gears lose some tenths; a larger constant torque is a bias
+_MAX_FRICTION = 0.3
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -124,7 +125,7 @@ class DigitalTwin:
         setup = self._setup = prepare(mechanism, speed_rpm=60.0 * commanded / TURN, wear=True)
         if not setup.clearance_joints:
             raise ConfigError(
-                mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
+                mechanism.source, "clearances.joints", "no joint has clearance, so nothing can wear"
             )
         self.clearance_joints = setup.clearance_joints
         self.parameters = LegParameters.none(mechanism)
@@ -221,14 +222,14 @@ class DigitalTwin:
     @property
     def intake(self) -> Intake:
         """Counts of samples and times since the twin was created."""
-        if self._intake is None:  # it is asked for several times between two updates
+        if self._intake is None:  # needed several times between two updates
             self._intake = intake(self._tracker.records, self._leg.records, self.settings.kinds)
         return self._intake
 
     def set_parameters(self, parameters: LegParameters) -> None:
-        """Continue with other masses, lengths, friction and drive; motion and wear go on.
+        """Continue with other masses, lengths, friction and drive; motion and wear stay.
 
-        Behind a compliant drive the crank swings; the load has the shape of the one in ``parameters``.
+        Behind a compliant drive the crank swings; the load has the same shape as in ``parameters``.
 
         Raises
         ------
@@ -429,7 +430,7 @@ class DigitalTwin:
         return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
-        """Append the gait cycle that ends at a stamp [ns] if it is complete; begin the next one."""
+        """Append the gait cycle that ends at a stamp [ns] if it is complete; begin the next cycle."""
         motion, depth = self._state.motion, self._setup.surfaces.depth
         if motion.cycle_is_whole:
             motion.cycles += 1
@@ -470,7 +471,7 @@ class DigitalTwin:
         return None
 
     def _end_torque(self, is_compared: bool) -> tuple[TorqueStatistics, TorqueProfile]:
-        """Torque of the gait cycle that ends; the load that it shows acts from now on."""
+        """Torque of the gait cycle that ends; the load estimated from it acts from now on."""
         # number of independent samples after two equal low-pass stages
         independent = max(0.25 * _CUTOFF * self._statistics.time[0], 1.0)
         sums = self._state.sums
@@ -532,6 +533,6 @@ class DigitalTwin:
         # the residual of averages refers to the torque without a load, the residual of instants does not
         loads = (-math.inf, math.inf) if self._instants else LOADS_N
         left_nm = self._repeating.rms_nm(loads, self._tolerated_nm)
-        # steps differ from the template
+        # because steps differ from the template
         step_nm = self._shape_torque * float(self.estimate.values[following.LOAD])
         return math.sqrt(max(0.0, left_nm**2 - step_nm**2)) if math.isfinite(left_nm) else left_nm

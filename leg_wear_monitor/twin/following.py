@@ -60,7 +60,7 @@ LEG_TORQUE = np.dtype(
         # predicted drive torque since the last sample
         ("impulse", "f8"),  # integral [N m s]
         ("time", "f8"),  # time [s]
-        ("mean_before", "f8"),  # mean before that sample [N m]
+        ("mean_before", "f8"),  # mean before this sample [N m]
         # predicted drive torque since the last torque sample
         ("sensed_impulse", "f8"),  # integral [N m s]
         ("sensed_squares", "f8"),  # integral of the square [N^2 m^2 s]
@@ -83,7 +83,7 @@ LOW_PASS = np.dtype(
         ("of_load", "f8", (2,)),  # torque per foot load [N m/N]
         ("of_friction", "f8", (2,)),  # torque per friction [-]
         ("of_load_friction", "f8", (2,)),  # torque per friction under load [N m]
-        # for a sensor that samples instants
+        # for a sensor of instantaneous values
         ("weight", "f8", (2,)),  # weight of an instant
         ("weighted_residual", "f8", (2,)),  # weight times residual [N m]
         ("weighted_regressor", "f8", (REGRESSORS, 2)),  # weight times regressors
@@ -111,7 +111,7 @@ TORQUE_SUMS = np.dtype(
         ("predicted_squares", "f8"),  # [N^2 m^2]
         ("gram", "f8", (REGRESSORS, REGRESSORS)),  # products of the regressors with each other
         ("along", "f8", (REGRESSORS,)),  # products of the regressors with the residual
-        # for a sensor that samples instants: rows of weight, then weight times residual and regressors
+        # for a sensor of instantaneous values: rows of weight, then weight times residual and regressors
         ("by_phase", "f8", (2 + REGRESSORS, PHASES)),
         # before the low-pass filter: weight, crank angle, measured torque, predicted torque, torque per load
         ("profile", "f8", (5, FINE_PHASES)),
@@ -132,7 +132,7 @@ LOAD_SUMS = np.dtype(
 
 LAST_LOAD = np.dtype(
     [
-        ("stamp_ns", "i8"),  # of the last sample of the foot load, 0 before the first
+        ("stamp_ns", "i8"),  # time of the last sample of the foot load, 0 before the first
         ("force", "f8", (2,)),  # its force [N]
         ("is_frozen", "i8"),  # 1 while the samples are wrong: the mean of earlier gait cycles stays
     ]
@@ -224,7 +224,7 @@ def pass_low(fraction, fresh, value, stages):
     return value
 
 
-# Torque comparison for a sensor that samples instants instead of averages (physics.md section 9).
+# Torque comparisonfor a sensor of instantaneous values instead of averages (physics.md section 9).
 #
 # With clearances the drive torque has peaks that are shorter than the time between two samples, so an instant
 # may or may not contain one: even for a healthy leg, low-pass filtered instants deviate from the mean by a
@@ -240,7 +240,7 @@ _VARIES, _FURTHEST = 0.5, 4.0
 
 @kernel
 def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle):
-    """Store an instant, and compare the previous one, whose predicted torque on both sides is now known.
+    """Store an instantaneous torque, and compare the previous value, whose prediction is now complete.
 
     ``mean`` [N m] and ``variance`` [N^2 m^2] are the mean and variance of the predicted torque since the
     previous instant, ``dt`` [s] before; ``lever`` [N m/N] is the drive torque per foot load, ``angle`` [rad]
@@ -297,7 +297,7 @@ _WEIGHT, _LONGEST_PERIOD, _OF_SCATTER = 0.05, 1.5, 4.0
 
 @kernel
 def compare(sensor, signature, leg, stepper, measured):
-    """Compare a measured torque [N m] with the mean of the predicted one since the previous torque sample.
+    """Compare a measured torque [N m] with the mean predicted torque since the previous torque sample.
 
     ``signature`` (N + 1,) is the drive torque per foot load [N m/N]. After lost torque samples, the predicted
     mean covers a longer time than the sensor's, and the sample is left out.
@@ -325,7 +325,7 @@ def compare(sensor, signature, leg, stepper, measured):
     if 0.0 < longest < duration:
         return
     torque.unfiltered = 0.0
-    # an average weighs by the time that it stands for; a torque of an instant stands for itself
+    # an average is weighted by its duration; an instantaneous torque has the weight 1
     weight = 1.0 if sensor.instants != 0 else duration / torque.period
     angle, toe = stepper.drive[ANGLE], 0.5 * (before + lever)
     add_to_profile(leg.sums.profile, angle, measured, mean / duration, toe, weight)

@@ -30,7 +30,7 @@ from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_
 # s: a longer time between samples is a gap; at twenty samples a second a stance has eight
 LONGEST_PUSH = 0.05
 _LEARNED = 10.0  # gait cycles over which the force is averaged
-_SMOOTH = 0.008  # turns: standard deviation of the window that smooths it
+_SMOOTH = 0.008  # standard deviation of the smoothing window [turns]
 # Fractions of the peak: a smaller vertical force than the first counts as none, a larger one than the second
 # acts as it is, with a smooth transition, since a jump would be an impact. Gait analysis takes 20 to 30 N as
 # the least force of a standing foot.
@@ -240,7 +240,7 @@ def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:
 
 
 def load_signatures(linkage: Linkage, forces: Sequence[Floats]) -> list[Floats]:
-    """Drive torques (POINTS,) [N m/N] for some forces (PHASES, 2) on the toe of a mechanism that has one."""
+    """Drive torques (POINTS,) [N m/N] for some forces (PHASES, 2) on the toe of a mechanism."""
     toe = linkage.mechanism.toe
     if toe is None:
         raise RuntimeError("a mechanism without a toe carries no load")

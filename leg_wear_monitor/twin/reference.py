@@ -35,7 +35,7 @@ MASS_TOLERANCE = 0.05
 
 
 # damping ratio of the crank on its coupling, with the mean inertia of the ideal leg: belts and elastomer
-# couplings lose 30 to 60 % of the energy of an oscillation in it, 4 pi times as much
+# couplings lose 30 to 60 % of the energy per oscillation, which is 4 pi times this ratio
 COUPLING_DAMPING = 0.05
 
 
@@ -242,7 +242,7 @@ def _fitted(
 
 
 def _evened(time_s: Floats) -> Floats | None:
-    """Times (n,) of samples that come evenly, but for lost ones; None where those given are not coarse."""
+    """Times (n,) of evenly spaced samples, except lost samples; None unless given times are coarse."""
     steps = np.diff(time_s)
     period = float(np.mean(steps[steps <= _LOST * np.median(steps)]))
     if np.gcd.reduce(np.rint(1.0e9 * steps).astype(np.int64)) < 1.0e9 * _COARSE * period:
@@ -293,7 +293,7 @@ def simulate_cycles(
 
     ``pieces`` (POINTS, 7) are the crank's motion in cycle 0, and a cycle takes ``period`` [s] for ``turn``
     [rad]. ``out_torque`` (cycles, POINTS) [N m] gets the mean torques between equal times; to
-    ``out_eccentricity`` (POINTS, 2 k) [m] those at these times are added, but for the first ``settling``
+    ``out_eccentricity`` (POINTS, 2 k) [m] those at these times are added, except for the first ``settling``
     cycles. Returns DONE, or the reason for stopping.
     """
     cycles, points = out_torque.shape
@@ -320,7 +320,7 @@ def simulate_cycles(
 
 
 class LegSimulation:
-    """Simulates legs without wear, one after the other.
+    """Simulates legs without wear, in order.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ class LegSimulation:
             Mean drive torque [N m] between equal steps of time of a gait cycle.
         eccentricity : (POINTS, k, 2) array
             Mean over the gait cycles at the end of each step [m]. The result is None if the leg cannot be
-            simulated, or is not wanted any more.
+            simulated, or is no longer needed.
 
         Raises
         ------
@@ -400,9 +400,9 @@ class LegSimulation:
         return torque[settling:], eccentricity.reshape(POINTS, -1, 2) / cycles
 
     def _each_under_its_load(self, load: Floats, cycles: int) -> Iterator[int]:
-        """Number of each gait cycle, whose load, if there is one, acts on the leg then.
+        """Number of each gait cycle, which selects the load on the leg.
 
-        A force that were the same in each step would let impacts fall at the same phases.
+        With the same force in each step, all impacts would have the same phases.
         """
         if self._loaded is None:
             yield from range(cycles)

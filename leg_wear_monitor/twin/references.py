@@ -34,15 +34,17 @@ from leg_wear_monitor.twin.reference import (
     even_angles,
 )
 
-CADENCES = 6  # cadences whose references of a leg are kept
+CADENCES = 6  # number of cadences whose references are stored
 
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
 _PERIODS = 4  # evaluation periods in a commanded gait cycle
-SIM_CYCLES_PER_PERIOD = 8  # in an evaluation period, a quarter gait cycle; a core does half as many more
-CLEARANCE_FACTORS = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # on the expected clearance, one joint at a time
+# number per evaluation period, a quarter of a gait cycle; a core could simulate 1.5 times as many
+SIM_CYCLES_PER_PERIOD = 8
+# factors on the expected clearance, for one joint at a time
+CLEARANCE_FACTORS = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)
 
-WORN, NARROWER = 1.2, 0.8  # a clearance over its new one, and a factor on the other clearances
+WORN, NARROWER = 1.2, 0.8  # ratio of a clearance to its new value, and a factor on the other clearances
 
 # factors on the mass of one body at a time (half a kilogram on a foot, two on a thigh), and on the friction
 # of all joints. Files and ledgers know such legs by their places alone: others would need one for them there
@@ -83,7 +85,7 @@ class TorqueReference:
 
     @property
     def is_whole(self) -> bool:
-        """True if all legs are simulated: a part of a reference has the torques of the first ones."""
+        """True if all legs are simulated; a partial reference has the torques of the first legs."""
         return len(self.torque_nm) == len(self.clearance_m)
 
     @property
@@ -178,7 +180,7 @@ class ReferenceRun(Generic[FoundT]):
         self._threads = numba.config.NUMBA_NUM_THREADS
         self._pool = ThreadPoolExecutor(self._threads, "reference")
         self._ahead: list[Future[NDArray[Any] | None]] = []
-        self._wanted = object()  # replaced as soon as no caller waits for the threads' simulations
+        self._wanted = object()  # replaced when no caller waits for the simulations of the threads
         self._of_thread = threading.local()
 
     def _so_far(self) -> FoundT:
@@ -186,7 +188,7 @@ class ReferenceRun(Generic[FoundT]):
         raise NotImplementedError
 
     def _stored(self, torque: Floats, eccentricity: Floats) -> NDArray[Any]:
-        """Part of a leg's torque or eccentricities, as of `LegSimulation.simulate`, that is kept."""
+        """Part of a leg's torque or eccentricities, as in `LegSimulation.simulate`, that is kept."""
         raise NotImplementedError
 
     @property
@@ -216,7 +218,7 @@ class ReferenceRun(Generic[FoundT]):
         return max(0, periods) / _PERIODS
 
     def advance(self, waits: bool = False) -> FoundT | None:
-        """Note that an evaluation period has passed; return the reference when all of it is due.
+        """Note that an evaluation period has passed; return the reference when it is due.
 
         A leg that cannot be simulated ends it then without one, or before where the run may be late. The
         caller may wait for each leg.
@@ -253,7 +255,7 @@ class ReferenceRun(Generic[FoundT]):
     def _begin(
         self, legs: Sequence[Leg], depth: Floats, profile: CrankProfile, done: Sequence[NDArray[Any]] = ()
     ) -> None:
-        """Begin to simulate legs, the first of which may be simulated already."""
+        """Begin to simulate legs; the first legs may be simulated already."""
         self.leave()
         self._legs, self._depth, self._profile = tuple(legs), depth.copy(), profile
         self._done, self._periods = tuple(done), -(-self._cost(legs[: len(done)]) // self.pace)
@@ -265,7 +267,7 @@ class ReferenceRun(Generic[FoundT]):
         return int(np.searchsorted(costs, self.pace * self._periods, side="right"))
 
     def _take(self, waits: bool) -> bool:
-        """Take the legs that are due and simulated, or wait for them, up to one that cannot be.
+        """Take the legs that are due and simulated, or wait for them, up to the first leg that fails.
 
         Returns whether all of them can be simulated.
         """
@@ -279,7 +281,7 @@ class ReferenceRun(Generic[FoundT]):
         return True
 
     def _look_ahead(self) -> None:
-        """Let the threads simulate the next legs: not all, since a program's end waits for them."""
+        """Let the threads simulate the next legs; not all, because the end of the program waits for them."""
         simulated = len(self._done) + sum(one.done() for one in self._ahead)
         first = len(self._done) + len(self._ahead)
         for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
@@ -293,7 +295,7 @@ class ReferenceRun(Generic[FoundT]):
     def _simulated(
         self, wanted: object, profile: CrankProfile, leg: Leg, depth: Floats
     ) -> NDArray[Any] | None:
-        """Stored part of a leg; None if it cannot be simulated, or is not wanted any more."""
+        """Stored part of a leg; None if it cannot be simulated, or is no longer needed."""
         own = self._of_thread
         if not hasattr(own, "simulation"):
             own.simulation = LegSimulation(self._mechanism)
@@ -314,7 +316,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     ----------
     mechanism : Mechanism
     cycles : int, optional
-        Gait cycles of each leg but the first, the expected one, which has twice as many.
+        Gait cycles of each leg; the first leg, which is the expected leg, has twice as many.
     """
 
     pace = SIM_CYCLES_PER_PERIOD
@@ -363,13 +365,13 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     def begin_expected(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
     ) -> None:
-        """Begin the expected leg alone, as of `begin`."""
+        """Begin only the expected leg; parameters as in `begin`."""
         self._begin_legs([(parameters, np.maximum(clearance_m, LEAST_CLEARANCE_M))], depth, profile)
 
     def begin_identification(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
     ) -> None:
-        """Begin the leg with given parameters, then legs in which all of them are changed, as of `design`."""
+        """Begin the leg with given parameters, then legs in which all of them are changed, as in `design`."""
         expected = np.maximum(clearance_m, LEAST_CLEARANCE_M)
         self._begin_legs([(one, expected) for one in _changed(near)], depth, profile)
 
@@ -380,7 +382,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         ----------
         part : TorqueReference
         depth : (k, 2, N) array
-            Wear depths [m], as of `begin`.
+            Wear depths [m], as in `begin`.
         """
         own = part.parameters
         if part.is_of_parameters:
@@ -403,7 +405,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
 
     @property
     def part(self) -> TorqueReference | None:
-        """The legs of a reference that are due so far; None where none is, or all are."""
+        """The legs of a reference that are due so far; None if no leg or all legs are due."""
         self._take(waits=not self.may_be_late)
         return self._so_far() if self._done and self.is_busy else None
 
@@ -430,12 +432,12 @@ def design(parameters: int) -> Floats:
 
 
 def levels_of(near: LegParameters) -> Floats:
-    """Levels, as of `design`, of masses, lengths and friction."""
+    """Levels, as in `design`, of masses, lengths and friction."""
     return design(2 * len(near.mass) + 1)
 
 
 def _changed(near: LegParameters) -> list[LegParameters]:
-    """Given parameters, then those of legs with other masses, lengths and friction."""
+    """The given parameters, then the parameters of legs with other masses, lengths and friction."""
     bodies, legs = len(near.mass), []
     for levels in levels_of(near):
         mass, length, friction = np.split(levels, [bodies, 2 * bodies])

@@ -142,14 +142,14 @@ LOAD_SOURCES = NO_LOAD, WRENCH, FLOAT64, CONTACT = "none", "wrench", "float64", 
 LOAD_FRAMES = GROUND_FRAME, FOOT_FRAME = "ground", "foot"
 LOAD_MODELS = NONE, GROUND, MEASURED = "none", "ground", "measured"
 
-GATE_RAD = 0.1  # deviation of an angle from its prediction, beyond its scatter, that makes it an outlier
+GATE_RAD = 0.1  # an angle is an outlier if it deviates from its prediction by this much more than its scatter
 LOADS_N = 0.0, 1000.0  # least and largest foot load by the drive torque: the ground pushes, and does not pull
 
 
 BRIDGE_LIMIT_S = 0.5
 """Longest gap that the tracker bridges at the tracked speed: half a gait cycle at 60 rpm."""
 
-BANDWIDTH_HZ = 8.0  # of the tracked crank motion; faster changes are treated as noise
+BANDWIDTH_HZ = 8.0  # bandwidth of the tracked crank motion; faster changes are treated as noise
 # Largest delay of a sample behind younger samples of its kind. If a whole kind is late, the tracker waits for
 # it up to the bridged gap.
 REORDER_WINDOW_S = 0.02

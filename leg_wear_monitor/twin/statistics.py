@@ -24,7 +24,7 @@ class Tracking(Enum):
 class TwinEventKind(Enum):
     """Kind of an event of the twin; the value is used as a key."""
 
-    ACQUIRED = "acquired"  # the leg is set in motion (again), its wear unchanged
+    ACQUIRED = "acquired"  # the leg starts to move (again), with unchanged wear
     STOPPED = "stopped"
     MOVING = "moving"
     REVERSED = "reversed"
@@ -40,7 +40,7 @@ class TwinEventKind(Enum):
 
 @attrs.frozen
 class Event:
-    """An event at a stamp, in a joint if it concerns one."""
+    """An event at a stamp, with its joint if it concerns a joint."""
 
     stamp_ns: int
     what: TwinEventKind
@@ -78,10 +78,10 @@ class SampleStatistics:
 
 
 class NotCompared(Enum):
-    """Why the torque of a gait cycle is not compared with the predicted one; the value is used as a key."""
+    """Why the torque of a gait cycle is not compared with its prediction; the value is used as a key."""
 
     FIRST = "first"  # the first whole gait cycle since the leg was set in motion
-    CADENCE = "cadence"  # it lasted longer or shorter than the one before
+    CADENCE = "cadence"  # it lasted longer or shorter than the previous cycle
     GAP = "gap"  # motion was bridged in it
     SAMPLES = "samples"  # too few torque samples
 
@@ -135,7 +135,7 @@ class TorqueProfile:
     Attributes
     ----------
     number, angle_rad : (FINE_PHASES,) array
-        Samples in each phase, averages weighted by the time that they stand for, and the sum of their crank
+        Samples in each phase, averages weighted by their duration, and the sum of their crank
         angles.
     measured_nm, predicted_nm : (FINE_PHASES,) array
         Measured torque, and the torque of the model without a foot load.
@@ -328,7 +328,7 @@ class Intake:
 
 
 def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
-    """Concatenation of sample statistics; empty ones without parts."""
+    """Concatenation of sample statistics; empty statistics without parts."""
     if len(parts) == 1:
         return parts[0]
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)

@@ -115,7 +115,7 @@ DROP_IT, KEEP_IT, AFTER_JUMP = range(3)
 
 @kernel
 def arrive(state, sample):
-    """Decision on a sample, by its stamp and the previous ones.
+    """Decision on a sample, by its stamp and the previous stamps.
 
     A stamp far from the other stamps is accepted only after a second such stamp, because one wrong clock
     reading must not end the tracking.
@@ -150,7 +150,7 @@ def arrive(state, sample):
 
 @kernel
 def horizon_of(clock):
-    """Stamp [ns] up to which the order of samples is final, one window behind the youngest.
+    """Stamp [ns] up to which the order of samples is final: one window before the youngest sample.
 
     Kinds wait for each other up to the longest bridged gap: samples of a topic that is late, or that arrive
     after a burst of the other topic, are not lost.
@@ -165,7 +165,7 @@ def horizon_of(clock):
 
 @kernel
 def insert(state, sample):
-    """Insert a sample into the waiting ones in order; False for a repeated one."""
+    """Insert a sample in the order of the waiting samples; False for a repeated sample."""
     clock, arrivals, stamp, kind = state.clock, state.arrivals, sample.stamp_ns, sample.kind
     i = clock.waiting
     while i > 0 and (

@@ -4,7 +4,7 @@ import pytest
 
 # arguments, and what the line must say
 WRONG = [
-    ("", ["no verb", "check, ", "--help"]),
+    ("", ["no command", "check, ", "--help"]),
     ("fleet", ["error: Missing command. (see", "fleet --help)"]),
     ("simulat", ["'simulat'", "check, ", "did you mean simulate?"]),
     ("simulate --clearence A", ["--clearence", "--clearance"]),
@@ -25,8 +25,8 @@ WRONG = [
     ("simulate --clearances Q", ["--clearances", "'Q'", "bionic_leg.yaml", "A, B, C"]),
     ("design --clearances Z", ["--clearances: 'Z'", "bionic_leg.yaml", "A, B, C"]),
     ("life --clearances A,A", ["--clearances", "'A,A'", "twice"]),
-    ("life --mechanism andrews", ["andrews.yaml: clearances.joints: no joint has clearance, nothing can"]),
-    ("design andrews", ["andrews.yaml: clearances.joints: no joint has clearance, nothing can"]),
+    ("life --mechanism andrews", ["andrews.yaml: clearances.joints: no joint has clearance, so nothing can"]),
+    ("design andrews", ["andrews.yaml: clearances.joints: no joint has clearance, so nothing can"]),
     ("simulate --clearances A,A", ["--clearances", "'A,A'", "twice"]),
     ("simulate --mechanism andrews --clearances O", ["--clearances", "'O'", "andrews.yaml", "none"]),
     ("simulate --mechanism andrews", ["andrews.yaml", "drive.torque", "--duration"]),

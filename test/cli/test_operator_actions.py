@@ -79,7 +79,7 @@ def test_a_different_wear_coefficient_is_reported_and_needs_the_parameter_file(
     (line,) = run(*given, "--config", str(config)).err.splitlines()
     assert line.startswith(
         f"warning: {config}: wear coefficient of joints A, B, G, I, J: 4e-15 1/Pa (bushing and journal "
-        "together), and the wear in the ledger was counted with 2e-15 1/Pa; that wear stays as modelled"
+        "together), but the wear in the ledger was modelled with 2e-15 1/Pa; that wear stays as modelled"
     )
     assert "name the parameter file of this leg" in refused(*given)
 
@@ -357,9 +357,9 @@ def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, stopped_ledger):
     before, spans = content(stopped_ledger)
     result = run("reset", "G", "--ledger", str(stopped_ledger))
     assert (result.code, result.err) == (0, "")
-    reply = "joint G: new surfaces, 60 um of wear from 4000 gait cycles are set to 0, history kept"
+    reply = "joint G: new surfaces, 60 µm of wear from 4000 gait cycles are set to 0, history kept"
     assert result.out.splitlines() == [
-        f"{reply}; --undo reverts it",
+        f"{reply}; --undo reverts this",
         "alarms cleared: impact_force G, clearance G; still present: clearance A",
         "let the leg walk: the next gait cycles confirm the repair",
     ]
@@ -381,7 +381,7 @@ def test_an_undone_reset_is_as_before(run, stopped_ledger):
     before, spans = content(stopped_ledger)
     run("reset", "G", "--ledger", str(stopped_ledger))
     result = run("reset", "G", "--undo", "--ledger", str(stopped_ledger))
-    assert "the wear is again 60 um of wear from 4000 gait cycles, including the wear since" in result.out
+    assert "the wear is again 60 µm of wear from 4000 gait cycles, including the wear since" in result.out
     after, now = content(stopped_ledger)
     assert now == spans
     for one, other in zip(before.joints, after.joints, strict=True):

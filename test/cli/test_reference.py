@@ -107,7 +107,7 @@ def test_a_load_in_another_unit_is_warned_of(tmp_path: Path, peak: str, shown: s
         (["--out", "nowhere/leg.npz"], "--out: nowhere/leg.npz: cannot be written: No such file"),
         ([], "--out"),
         (["--load", "none.csv", "--out", "leg.npz"], "none.csv: cannot be read: "),
-        (["slider_crank", "--load", "none.csv", "--out", "leg.npz"], "no point is called toe"),
+        (["slider_crank", "--load", "none.csv", "--out", "leg.npz"], "no point called toe"),
     ],
 )
 def test_bad_command_lines_are_one_line(run, arguments: list[str], fault: str) -> None:

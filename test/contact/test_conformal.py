@@ -227,7 +227,7 @@ def test_what_is_said_of_a_wide_arc_has_its_numbers_and_the_law_that_holds():
     assert contact_doubt(NARROW_RAD, 800.0, 0.01, is_winkler=False) is None
     assert contact_doubt(math.radians(41.0), 800.0, 0.01, is_winkler=True) is None
     wide = contact_doubt(WIDEST_RAD + 0.01, 800.0, 0.01, is_winkler=True) or ""
-    assert wide.endswith("normal_law winkler holds up to 60 deg")
+    assert wide.endswith("normal_law winkler is valid up to 60 deg")
 
 
 def test_shipped_mechanisms_have_narrow_contacts():
@@ -253,7 +253,7 @@ def test_tight_bushings_of_plastic_are_doubted_joint_by_joint():
     assert list(conformity_doubts(build_linkage(soft(3e-4)))) == []
     (widest,) = conformity_doubts(build_linkage(soft(5e-6, normal_law="winkler")))
     assert str(widest).startswith("clearances (A): normal_law: contact half angle 68 deg at 749 N")
-    assert str(widest).endswith("normal_law winkler holds up to 60 deg")
+    assert str(widest).endswith("normal_law winkler is valid up to 60 deg")
 
 
 def test_no_clearance_joint_is_no_doubt():

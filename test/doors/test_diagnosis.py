@@ -108,7 +108,7 @@ def test_a_late_torque_hides_no_joint_that_opens(torque_of, table) -> None:
     opened_m = 4.5e-4
     summary = lw.replay(late(table(torque_of(TAKEN), torque_of(TAKEN, G=opened_m)))).summary()
     assert (summary.verdict.fault_code, summary.diagnosis.cause_subject) == ("CLEARANCE_CHANGED_G", "G")
-    assert "its time does not fit the crank angle" in summary.verdict.why
+    assert "the timing of the drive torque does not fit" in summary.verdict.why
     assert summary.clearances["G"].estimated_m == pytest.approx(opened_m, abs=8.0e-5)
 
 

@@ -57,7 +57,7 @@ def test_what_is_done_and_what_is_found(run, code: int, line: str) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("", "no verb"),
+        ("", "no command"),
         ("simulat", "did you mean simulate?"),
         ("simulate --cycles many", "--cycles"),
         ("check wrong.yaml", "wrong.yaml: bodies.crank.mass: 0.0 is not above 0 kg"),

@@ -172,10 +172,10 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
 @pytest.mark.parametrize(
     "model, is_sent, words",
     [
-        ("measured", lambda t: t < 7.0, "the mean load of earlier gait cycles acts"),
-        ("measured", lambda t: t < 0.0, "no load acts: the modelled wear on the ground is too small"),
-        ("measured", lambda t: abs(t % 1.0 - 0.4) < 0.3, "the mean load of the last gait cycles acts"),
-        ("none", lambda t: t < 7.0, "the load by the drive torque acts"),
+        ("measured", lambda t: t < 7.0, "the model uses the mean load of earlier gait cycles"),
+        ("measured", lambda t: t < 0.0, "the model uses no load"),
+        ("measured", lambda t: abs(t % 1.0 - 0.4) < 0.3, "the mean load of the last gait cycles"),
+        ("none", lambda t: t < 7.0, "the model uses the load estimated from the drive torque"),
     ],
 )
 def test_words_on_missing_samples_say_what_acts(walk, model, is_sent, words):
@@ -217,7 +217,7 @@ def test_single_spikes_do_not_wear_and_are_reported(walk):
     assert reports.lost.outliers == 6
     status = status_of(monitor, "foot_load")
     assert status.values["outliers"] == 6.0
-    assert "6 samples are outliers, far from the samples before and after, and not used" in status.message
+    assert "6 samples are outliers, far from the samples before and after; not used" in status.message
     assert status_of(monitor, "input").values["load_outliers"] == 6.0
 
 

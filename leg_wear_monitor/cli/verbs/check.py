@@ -221,7 +221,7 @@ def _mechanism(name: str) -> str:
 # ``leg-wear-monitor drives``: drives by name, with the sources of their values.
 
 
-@click.command(short_help="List drives by name, with the sources of their values.")
+@click.command(short_help="List the known drives, or show one with its sources.")
 @click.argument("name", required=False)
 @common.json_option("the drives")
 def drives(name: str | None, json_file: Path | None) -> None:
@@ -268,7 +268,7 @@ def _drive_in_full(drive: "Drive") -> list[str]:
 # ``leg-wear-monitor materials``: material pairs of joints, with their sources.
 
 
-@click.command(short_help="List the material pairs of joints, with their sources.")
+@click.command(short_help="List the known material pairs, or show one with its sources.")
 @click.argument("name", required=False)
 @common.json_option("the pairs")
 def materials(name: str | None, json_file: Path | None) -> None:
@@ -321,7 +321,7 @@ def _in_full(pair: "Material") -> list[str]:
 def cache(fill: bool, clear: bool) -> None:
     """Show the directory and the size of the compiled code, remove it, or compile it ahead of time.
 
-    After `--fill` the first simulation, replay and start of a node are as fast as later ones.
+    After `--fill`, the first simulation, replay and start of a node do not compile anything.
 
     Each change of the source makes a new version. Old versions are kept until `--clear`.
     """

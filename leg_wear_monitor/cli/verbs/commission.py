@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 )
 @common.option("--joint-states", "TOPIC", "Topic of the crank.  [default: all are tried]")
 @common.option("--drive-torque", "TOPIC", "Topic of the torque.  [default: all are tried]")
-@common.option("--crank-joint", "NAME", "The crank's name.  [default: all joints are tried]")
+@common.option("--crank-joint", "NAME", "Name of the crank joint.  [default: all joints are tried]")
 @common.json_option("the result")
 def commission(
     recordings: tuple[Path, ...],
@@ -83,7 +83,7 @@ def commission(
         written.append(reference)
     if out is not None and result.config is not None:
         if out.exists() and not result.is_sure:
-            click.echo(f"not written: {out} exists, and the proposal is not certain in all", err=True)
+            click.echo(f"not written: {out} exists, and not all proposed parameters are certain", err=True)
         else:
             common.write_file(out, result.to_yaml().encode())
             written.append(out)
@@ -104,7 +104,7 @@ def _print(result: "CommissioningResult") -> None:
         shown = (figure(item.sigma), figure(item.mismatch), _shown(item.other), figure(item.other_mismatch))
         table.add_row(item.name, f"{_shown(item.value)} {item.unit}".strip(), *shown)
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n", table, sep="\n")
-    console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
+    console.print("\nmismatch: RMS of the unexplained torque as a fraction of the RMS of the torque\n")
     for remark in result.remarks:
         console.print(printable(remark), soft_wrap=True)
     if result.config is None:
@@ -120,7 +120,7 @@ def _shown(value: str | int | float | None) -> str:
 # ``leg-wear-monitor reference``: simulates the reference that the diagnosis compares with a drive torque.
 
 
-@click.command(short_help="Simulate a torque reference beforehand.")
+@click.command(short_help="Simulate a torque reference of a leg in advance.")
 @click.argument("mechanism", required=False)
 @common.config_option
 @common.section_option
@@ -152,7 +152,7 @@ def reference(
     load: Path | None,
     out: Path,
 ) -> None:
-    """Simulate the torque reference of a leg, which the diagnosis compares with.
+    """Simulate the torque reference that the diagnosis of a leg needs.
 
     MECHANISM is a mechanism file, or the name of one that comes with the package; by default, the mechanism
     of the parameter file. The crank turns steadily, the leg is new. If diagnosis.reference names the file,
@@ -174,7 +174,7 @@ def reference(
         config_from(values_of(settings) | {"cadence.commanded_rpm": cadence}, "--cadence")
     leg = fitted(load_mechanism(settings.mechanism), settings)
     if load is not None and leg.toe is None:
-        raise ConfigError(leg.source, "bodies", "no point is called toe, on which --load would act")
+        raise ConfigError(leg.source, "bodies", "has no point called toe, where --load acts")
     force = read_toe_force(load) if load is not None else None
     began = time.perf_counter()
     with common.compilation(), common.progress_bar("simulating") as progress:

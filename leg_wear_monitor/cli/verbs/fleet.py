@@ -17,7 +17,7 @@ _OUT = "Directory of the fleet.  [default: the key out of the fleet file, or fle
 _fresh_option = common.option(
     "--fresh-days",
     "DAYS",
-    "A leg is outdated if its last recording is older.",
+    "A leg is outdated if its last recording is older than this.",
     type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
     default=7.0,
 )
@@ -75,7 +75,7 @@ def update(
     return common.WITH_FINDINGS if done.findings else 0
 
 
-@fleet.command(short_help="Write the page of the fleet again.")
+@fleet.command(short_help="Write the page of the fleet again, without an update.")
 @click.argument("path", type=click.Path(path_type=Path), metavar="FLEET.yaml|DIR")
 @common.out_option(_OUT)
 @_fresh_option

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 
 
-@click.command(short_help="Simulate the wear of a leg over its life, by cycle jumps.")
+@click.command(short_help="Simulate the wear of a leg over its whole life.")
 @common.mechanism_option
 @common.clearances_option
 @common.speed_option
@@ -35,7 +35,7 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     "N:H,...",
     "Hours per day at each peak of the ground's vertical force on the "
     "toe, as N:hours, such as 0:2,300:5,600:1.  "
-    "[default: the mechanism's own loads]",
+    "[default: as in the file]",
 )
 @common.positive("--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump [m].  [default: 3e-05]")
 @common.count("--legs", "N", "Number of legs averaged.  [default: 2]")
@@ -62,7 +62,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     common.check_outputs(json_file, out)
     with common.options_named():
         lives = _lives(leg, **options)
-    # only after success: the message of a failure names the doubts itself
+    # only after success, because the message of a failure contains the doubts
     common.warn_of(leg.source, doubts(leg))
     result, document = lives[0][1], _document(leg, lives, limit_m)
     text = json_text(document)
@@ -142,7 +142,7 @@ def _life_end(result: "Life", end: dict[str, float | None], limit_m: float) -> s
     if end["cycles"] is None:
         return f"does not reach {1e6 * limit_m:g} µm: its clearance does not grow at the last rate"
     days = f", {end['days']:.3g} days of {result.duty.hours_per_day:g} h" if result.duty else ""
-    beyond = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated at its last rate"
+    beyond = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated with the last growth"
     after = f"{end['cycles']:.3g} gait cycles, {end['hours']:.3g} h{days}"
     return f"reaches {1e6 * limit_m:g} µm after {after}{beyond}"
 
@@ -161,7 +161,7 @@ def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[fl
     return found
 
 
-@click.command(short_help="Find bushings with which each joint lasts the wanted hours.")
+@click.command(short_help="Find bushings for a wanted life of each joint.")
 @click.argument("mechanism", default="bionic_leg")
 @common.clearances_option
 @common.option(
@@ -191,7 +191,7 @@ def design(
     json_file: Path | None,
     **options: Any,
 ) -> None:
-    """Find bushings with which each joint of a leg lasts the given hours.
+    """Find bushings for a wanted life of each joint of a leg.
 
     One life of the leg under the duty gives forces and sliding over the clearance. They give the life of
     every pair and size, by wear or by the maker's formula, and the maker's limits that are exceeded. Check a

@@ -67,7 +67,7 @@ _PATIENCE_S = 60.0
 _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
 
 
-@click.command(short_help="Run a demonstration on this machine, less than a minute.")
+@click.command(short_help="Run a demonstration of less than a minute.")
 @common.option(
     "--out",
     "DIR",
@@ -159,7 +159,7 @@ def _listen(out: Path) -> dict[str, Any]:
 
 @contextmanager
 def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
-    """A node in its own process, which ends it as a terminal does."""
+    """A node in its own process; it ends on SIGINT, as from a terminal."""
     from leg_wear_monitor.workers import python_command
 
     command = python_command(program, verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}")
@@ -244,7 +244,7 @@ def _compare_with_truth(out: Path, live: dict[str, Any]) -> None:
 _NODE = "/leg_wear_monitor"
 
 
-@click.command(short_help="Show a leg live in a browser, read-only.")
+@click.command(short_help="Show a leg live in a browser.")
 @common.option(
     "--node", "NAME", "Full name of a running monitor, such as /left/leg_wear_monitor.", default=_NODE
 )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 TIMES = ("header", "log", "publish")
 
 
-@click.command(short_help="Replay a recording through the monitor.")
+@click.command(short_help="Run the monitor on a recording.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
 @common.out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
 @common.config_option
@@ -35,10 +35,10 @@ TIMES = ("header", "log", "publish")
 @common.option(
     "--node",
     "NAME",
-    "Full name of the node whose parameters apply.  [default: leg_wear_monitor "
+    "Full name of the node whose parameters are used. [default: leg_wear_monitor "
     "in the namespace of the crank's topic]",
 )
-@common.option("--crank-joint", "NAME", "The crank's name.  [default: crank_joint of the parameters]")
+@common.option("--crank-joint", "NAME", "Name of the crank joint.  [default: crank_joint in the parameters]")
 @common.file_option(
     "--ledger", "FILE", "Ledger to continue or to start. The ledger in the parameters is never changed."
 )
@@ -162,7 +162,7 @@ def write_replay(
 # ``leg-wear-monitor report``: the page of a run again, from its data.
 
 
-@click.command(short_help="Write the HTML page of a run again, from its data.")
+@click.command(short_help="Write the HTML page of a study or a replay again.")
 @click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
 def report(directory: Path) -> int:
     """Draw the page of a study or a replay again from the data in DIR; nothing is computed."""

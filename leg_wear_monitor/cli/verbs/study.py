@@ -74,7 +74,7 @@ def _compute(settings: "Study", out: Path, workers: int | None, scheduler: str |
             scheduler=scheduler,
             progress=progress,
         )
-    common.warn_of(leg.source, doubts(leg))  # an error names its doubts in its own line
+    common.warn_of(leg.source, doubts(leg))  # an error reports its doubts in a separate line
     return computed, len(settings.points())
 
 
@@ -100,7 +100,7 @@ def write_study_page(path: Path) -> int:
 _URDF = ".urdf"
 
 
-@click.command(short_help="Draw a mechanism, working or not.")
+@click.command(short_help="Draw a mechanism, even if it is faulty.")
 @click.argument("mechanism", metavar="MECHANISM")
 @common.path_option(
     "--out",
@@ -151,7 +151,7 @@ MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
 _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 
 
-@click.command(short_help="Simulate the leg offline, ideal or with clearances.")
+@click.command(short_help="Simulate a leg, ideal or with clearances.")
 @common.mechanism_option
 @common.clearances_option
 @common.positive("--clearance-m", "M", "Radial clearance [m].  [default: the mechanism's own]")
@@ -214,7 +214,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     common.check_outputs(json_file, out)
     with common.options_named():
         result, wall_s = _run(leg, _keywords(**options))
-    common.warn_of(leg.source, doubts(leg))  # an error names its doubts in its own line
+    common.warn_of(leg.source, doubts(leg))  # an error reports its doubts in a separate line
     if (given := options["clearance_m"]) is not None:
         for radius in sorted({leg.clearances[name].bushing_radius for name in result.clearance_joints}):
             if fault := ratio_fault(given, radius):
@@ -237,7 +237,7 @@ def _keywords(clearances: str | None, wear: str, **options: Any) -> dict[str, An
 
 
 def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult", float]:
-    """The result, and the time [s] it took once all was compiled."""
+    """The result, and its computing time [s] without compilation."""
     from leg_wear_monitor.dynamics.clearance.stepper import motion_beside
     from leg_wear_monitor.dynamics.simulation import default_model, simulate
     from leg_wear_monitor.mechanism.spec import SpeedDrive

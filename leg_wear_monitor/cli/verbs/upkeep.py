@@ -48,7 +48,7 @@ def target_options(verb: Callable[..., int]) -> Callable[..., int]:
 
 
 def _live_node(config: Path | None, ledger: Path | None, node: str | None, **_: Any) -> str | None:
-    """Name of the running monitor that is asked for; None for a ledger."""
+    """Name of the running monitor from ``--node``; None for a ledger."""
     if node is None or config is not None:
         return None
     if ledger is not None:
@@ -60,7 +60,7 @@ def _live_node(config: Path | None, ledger: Path | None, node: str | None, **_: 
 def opened(
     joint: str | None = None, *, config: Path | None, ledger: Path | None, node: str | None, **_: Any
 ) -> Iterator["WearMonitor"]:
-    """A monitor on the ledger that is asked for; the ledger is written at the end or not at all."""
+    """A monitor on the given ledger; the ledger is written at the end or not at all."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.parameters import load_config
     from leg_wear_monitor.monitor.ledger.file import hardware_id_of
@@ -179,7 +179,7 @@ def reset(joint: str, undo: bool, **target: Any) -> int:
         else:
             words = wear_words(monitor.wear_of(joint))
             lines = [
-                f"new surfaces, {words} are set to 0, history kept; --undo reverts it",
+                f"new surfaces, {words} are set to 0, history kept; --undo reverts this",
                 f"alarms {alarm_words(*monitor.reset_wear(joint, now_ns, who))}",
                 "let the leg walk: the next gait cycles confirm the repair",
             ]

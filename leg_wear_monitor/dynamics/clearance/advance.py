@@ -192,7 +192,8 @@ _CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1, times 4/3, minus the offset 
 # A rest equal to one step up to rounding is one step; otherwise the last bit would decide between one and two
 # steps.
 _NEARLY = 1.0 + 1.0e-6
-_FASTEST_GROWTH = 3.0  # of a step over the previous one: no growth after a trial with too large an error
+# largest ratio of a step to the previous step: no growth after a trial with too large an error
+_FASTEST_GROWTH = 3.0
 # drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
@@ -232,7 +233,7 @@ ADVANCE = ByAddress(advance_clearances, numba.types.UniTuple(numba.types.int64, 
 
 @kernel
 def _interval(model, surfaces, state, polynomial, statistics, work):
-    """Advance by one interval, in parts where the linkage moves fast; returns status and joint."""
+    """Advance by one interval, in smaller parts where the linkage moves fast; returns status and joint."""
     i, _ = blend(model.parts.shape[0], state.drive[ANGLE])
     parts, status, k = model.parts[i], DONE, -1
     if model.coupling.law[STIFFNESS] > 0.0:

@@ -161,7 +161,7 @@ def take_directions(e, out_toward):
 
 @kernel
 def directions_of(ex, ey, k, toward):
-    """Angles [rad] of the eccentricities of eight joints, from the reference directions where near."""
+    """Angles [rad] of the eccentricities of eight joints, from a reference direction if it is near."""
     to_x, to_y = part_at(toward, (TO_X, k)), part_at(toward, (TO_Y, k))
     across, along, length = to_x * ey - to_y * ex, to_x * ex + to_y * ey, root(ex * ex + ey * ey)
     s = across / largest(length, LEAST_DIVISOR)

@@ -387,7 +387,7 @@ def _let_yield(inertia, torque, now, x, v, by_v, along, by_speed):
 
 @kernel
 def _follow_speed(whole, now, x, v, by_v, by_speed):
-    """Let the tables' forces follow the crank's speed; returns the drive torque's derivative by it [N m s].
+    """Update the forces of the tables to the crank speed; returns the derivative of the drive torque [N m s].
 
     An impact changes the speed as it changes e', because whole w + m e' does not change. With the speed at
     the start of the part, the masses that turn with the crank would push a light crank away.

@@ -62,7 +62,7 @@ INTERVALS = 2048  # intervals per turn at the setup's speed
 # Used if only statistics and wear are needed, and the drive is rigid; the errors are in physics.md section 7.
 STATISTICS_INTERVALS = 1024
 _MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
-TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
+TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller error does not change means
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
 
 
@@ -200,7 +200,7 @@ class ClearanceStepper:
         return ADVANCE.address(self.model, feeds_back, self.state, polynomial, 0.0, statistics, self.work)
 
     def take_tables(self) -> None:
-        """Cut intervals into parts as the tables say, which were changed in place."""
+        """Divide intervals into parts according to the tables, which were changed in place."""
         model = self.model
         model.parts[:] = _parts(model.tables, INTERVALS * model.interval * abs(self._setup.speed) / TURN)
 
@@ -305,7 +305,8 @@ class ClearanceRun:
         return self.stepper.observe()
 
 
-# Compilation of the motion before any leg is there: types of arguments do not depend on the mechanism.
+# Compilation of the motion before a leg exists, because the types of arguments do not depend on the
+# mechanism.
 
 
 def _contacts() -> ContactArrays:
@@ -319,7 +320,7 @@ def _contacts() -> ContactArrays:
 
 
 def _tables() -> ClearanceTables:
-    """Tables of one clearance joint, all 0 and as small as can be."""
+    """The smallest tables of one clearance joint, all 0."""
     width = padded(sum(math.prod(shape) for shape in motion_shapes(1, damped=False).values()))
     return ClearanceTables(
         motion=np.zeros((1, width)),
@@ -387,7 +388,7 @@ class LoadedTable(NamedTuple):
 
 
 def under_trial_force(linkage: Linkage) -> list[Linkage]:
-    """A linkage under a force on its toe along each axis, for `build_basis`; none for one without a toe."""
+    """A linkage under a force on its toe along each axis, for `build_basis`; empty without a toe."""
     mechanism = linkage.mechanism
     if mechanism.toe is None:
         return []
@@ -402,7 +403,7 @@ def under_trial_force(linkage: Linkage) -> list[Linkage]:
 def loaded_tables(
     linkage: Linkage, contacts: ContactArrays, into: ClearanceTables | None = None
 ) -> tuple[ClearanceTables, list[LoadedTable]]:
-    """Tables of a linkage without a force on its toe, and those of them that a force changes.
+    """Tables of a linkage without a force on its toe, and the tables that a force changes.
 
     Parameters
     ----------

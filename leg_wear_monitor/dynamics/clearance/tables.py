@@ -120,7 +120,7 @@ class Basis:
         levers = _friction_levers(linkage.arrays, contacts)
         self.friction: Floats = np.broadcast_to(levers, (n, *levers.shape))
         self.drag = _drag(linkage.arrays, motion.q, self.all)
-        curvature = self._curve(linkage, motion.q)  # larger than all else, and not kept
+        curvature = self._curve(linkage, motion.q)  # larger than all other arrays, and not kept
         self._take_forces(linkage, curvature)
         self.loaded = tuple(self._under_load(one, curvature) for one in loaded)
 

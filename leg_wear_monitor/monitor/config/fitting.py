@@ -179,7 +179,8 @@ def _wrong_length(
 # Usable parameters that are likely meant in a different unit; see also `mechanism.loader`.
 
 
-MOST_ACCELERATION = 1000.0  # impact forces of healthy legs stay as they are; at 5000 they reached 331 kN
+# up to this value, impact forces of healthy legs do not change; at 5000 they reached 331 kN
+MOST_ACCELERATION = 1000.0
 
 
 def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:

@@ -25,7 +25,7 @@ LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
 
 def _is_slow(rpm: float) -> str:
     cycle, meant = 60.0 / abs(rpm), rpm * 30.0 / math.pi
-    return f"{rpm:g} rpm is {cycle:.3g} s a gait cycle. Is it in rad/s? {rpm:g} rad/s is {meant:.4g} rpm"
+    return f"{rpm:g} rpm is {cycle:.3g} s per gait cycle. Is it in rad/s? {rpm:g} rad/s is {meant:.4g} rpm"
 
 
 def _turns(speed: float) -> str | None:
@@ -81,7 +81,7 @@ def _named(name: str) -> str | None:
 
 def _few_and_different(names: tuple[str, ...]) -> str | None:
     if len(names) > sample.ENCODERS:
-        return f"{list(names)} are {len(names)}. Expected at most {sample.ENCODERS}"
+        return f"{list(names)} are {len(names)} names. Expected at most {sample.ENCODERS}"
     return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are not different names"
 
 
@@ -114,7 +114,7 @@ class Encoders:
     )
     # gait cycles in which offset and scale of a new encoder are estimated
     commissioning_cycles: int = 100
-    # gait cycles per clearance estimate: a sudden change shows after half of them
+    # gait cycles per clearance estimate; a sudden change becomes visible after half of them
     window_cycles: int = 60
 
     def __attrs_post_init__(self) -> None:

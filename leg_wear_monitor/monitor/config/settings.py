@@ -129,12 +129,14 @@ class Forecasting:
     Values without a description are constants of the method, not parameters.
     """
 
-    load_sigma: float = 0.1  # for future wear per cycle, because load and pace vary
-    model_sigma: float = 0.4  # for the growth without simulated lives, and beyond them (forecast.md)
-    # for a new joint's clearance, as a fraction of it: the limits of a running fit are 20 % about its mean
+    load_sigma: float = 0.1  # spread of future wear per cycle, because load and pace vary
+    # spread of the growth without simulated lives, and beyond their end (forecast.md)
+    model_sigma: float = 0.4
+    # spread of a new joint's clearance as a fraction of it: the limits of a running fit are ± 20 % of its
+    # mean
     new_clearance_sigma: float = 0.1
     duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
-    duty_sigma: float = 0.2  # for the walking per day
+    duty_sigma: float = 0.2  # spread of the walking per day
     window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter
     growth_law_file: str = described(
         "file that `leg-wear-monitor life --ensemble-size 16 --json` wrote for this leg: how growth changes "

@@ -126,7 +126,7 @@ class TableInput:
 
     def __attrs_post_init__(self) -> None:
         if self.units.crank_angle == COUNTS and not self.counts_per_turn:
-            raise FieldError("counts_per_turn", "is missing. Expected the counts of the encoder in a turn")
+            raise FieldError("counts_per_turn", "is missing. Expected the encoder counts per turn")
 
     @property
     def angle_scale(self) -> tuple[float, float]:

@@ -29,8 +29,9 @@ SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corre
 _WHOLE = 1.4
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-_LEAST_CYCLES_UNLIKE = 6  # for a leg that differs from its reference: two strange steps are no change
-_FIT_EVERY = 10  # gait cycles, but for the first ones of a change
+# for a leg that differs from its reference, because two unusual steps are not a change
+_LEAST_CYCLES_UNLIKE = 6
+_FIT_EVERY = 10  # gait cycles, except for the first cycles of a change
 
 # times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
 # the first cycles of a change were selected by their detection. Four cycles of J at 0.55 mm under 300 N gave
@@ -111,7 +112,7 @@ class Evidence:
 
         The error of the correction then does not look like a further change; it stays in the standard
         deviation. A second joint that opened as well would have explained the change better; the error of
-        the fit of all clearances tells how far it may have opened.
+        the fit of all clearances limits its change.
         """
         known, own, before_m = state.commissioned, self._models.explainer(state), state.modelled_m
         state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
@@ -130,7 +131,7 @@ class Evidence:
     def _know_sensor(self, state: TorqueState) -> None:
         """Find the noise of the torque sensor, and the channel behind which a commissioned leg is expected.
 
-        Before it is commissioned, a wide joint and a filter could be taken for each other, so there is no
+        Before it is commissioned, a worn joint and a filter could be confused, so there is no
         channel. A baseline after a correction has an uncertain clearance: it keeps its channel.
         """
         known = state.commissioned
@@ -207,7 +208,7 @@ class Evidence:
         return _LEAST_CYCLES if self._models.fits(state) else _LEAST_CYCLES_UNLIKE
 
     def _fits(self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int) -> bool:
-        """True if a leg that was never commissioned matches the reference, but for one clearance at most.
+        """True if a leg that was never commissioned matches the reference, except for one clearance at most.
 
         It also matches if it did before a change: a large opening is explained less well.
         """
@@ -222,7 +223,7 @@ class Evidence:
     def _change(
         self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int
     ) -> Change | None:
-        """The change since a gait cycle, by the explanations of the cycles from then on, the best first.
+        """The change since a gait cycle, from the explanations of the later cycles, the best first.
 
         Before a leg is commissioned, only a sure clearance that is wide enough for a correction counts: all
         else is constant, and becomes part of the baseline. A change of a clearance gets its most probable
@@ -300,7 +301,7 @@ def _changed_load(state: TorqueState, change: Change) -> Change | None:
     known_n = float(np.mean(earlier)) if earlier else math.nan
     before_n = reported.counted if reported and reported.cause is Cause.LOAD else known_n
     value_n, sigma_n = float(np.mean(now)) - before_n, max(1.0, float(np.std(now)) / math.sqrt(len(now)))
-    if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # or the load is not known
+    if not abs(value_n) >= max(_LOAD_CHANGE_N, _LOAD_SIGMAS * sigma_n):  # or the load is unknown
         return None
     return Change(
         cause=Cause.LOAD,
@@ -319,7 +320,7 @@ def _since(change: Change, earlier_ns: int, state: TorqueState) -> Change:
 
 
 def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
-    """True if a leg as modelled, but for one clearance at most, explains a torque better than all others.
+    """True if a leg as modelled, except for one clearance at most, explains a torque better than all others.
 
     The explanations are sorted, the best first; UNKNOWN, the leg as modelled, is always among them.
     """

@@ -56,9 +56,9 @@ def _jitter(between_ns: Ints, period_ns: float) -> float:
 
 
 def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: TorqueSensor) -> CycleTorque | None:
-    """Drive torque between two passages of the crank's zero; None where samples are too few.
+    """Drive torque between two passages of the crank's zero; None if there are too few samples.
 
-    Samples that come faster than signatures need are averaged.
+    Samples at a higher rate than signatures need are averaged.
     """
     cranks, torques = within(kept.crank, begin_ns, end_ns), within(kept.torque, begin_ns, end_ns)
     crank_ns, crank = cranks["stamp_ns"], cranks["crank_angle_rad"]

@@ -402,7 +402,7 @@ class TorqueObserver(KeepsSamples):
             self._evidence.review(state, self.config)
 
     def _take_baseline(self, cycles: Sequence[SignedCycle]) -> None:
-        """Compare with some gait cycles from now on."""
+        """Use these gait cycles as the reference from now on."""
         state = self.state
         known = state.baseline(cycles, state.modelled_m)
         # a clearance that a correction left unknown is unknown at other cadences as well

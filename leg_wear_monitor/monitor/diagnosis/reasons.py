@@ -19,11 +19,9 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     TorqueState,
 )
 
-_IRREGULAR = (
-    "the stamps of the drive torque are too irregular, or their rate has changed: the time of a step between "
-    "two samples is not known"
-)
-_CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or three in a row are alike
+_IRREGULAR = "the stamps of the drive torque are too irregular, or their rate has changed"
+# in a ramp of 30 rpm per minute, two or three neighbouring cycles look alike
+_CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3
 
 
 def missing(state: TorqueState, references: References, config: MonitorConfig) -> str:
@@ -68,8 +66,8 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return _doubt_of_known_leg(state, models.explainer(state).joints)
     if state.sensor and state.is_narrow:
         hz = state.sensor.channel.bandwidth_hz
-        return f"the drive passes {hz:.0f} Hz of the torque: names of joints are not sure, none is corrected"
-    known = "the model does not fit this leg, and the names of joints are not sure: "
+        return f"the drive passes only {hz:.0f} Hz of the torque: names are uncertain, no joint is corrected"
+    known = "the model does not fit this leg, so the names of joints are uncertain: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
     if state.load and references.is_load_left_out(state):
@@ -78,7 +76,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if references.is_busy:
         return f"{known}{_simulated(state)} being simulated, {references.percent} %"
     if state.load and not state.load.is_sure and not math.isnan(state.load.other_n):
-        sizes = f"{state.load.peak_n:.0f} N and {state.load.other_n:.0f} N explain its drive torque as well"
+        sizes = f"{state.load.peak_n:.0f} N and {state.load.other_n:.0f} N explain its torque equally well"
         return f"{known}the force on the foot is not observable: {sizes}"
     return (
         f"{known}masses, lengths and friction near those of the file do not explain its drive torque; "
@@ -97,8 +95,8 @@ def _doubt_of_known_leg(state: TorqueState, joints: Sequence[str]) -> str:
     if state.fit.explains:
         return ""
     return (
-        "the drive torque does not fit the commissioned leg, and no clearance explains it; if the sensor was "
-        "changed, reset a joint and undo it: the leg is commissioned again"
+        "the drive torque does not fit the commissioned leg, and no clearance explains this; if the sensor "
+        "was changed, reset a joint and undo the reset: the leg is then commissioned again"
     )
 
 
@@ -114,12 +112,12 @@ def _not_compared(state: TorqueState) -> str:
     """Message on the gait cycles that are not tested for changes."""
     if state.is_load_other:
         return (
-            "the load at the foot differs from the reference: no clearance is observable until the leg is "
+            "the load at the foot differs from the reference: no clearance is observable before the leg is "
             "commissioned under this load"
         )
     rpm = sorted(60.0 * abs(one.speed) / TURN for one in state.compared_at)
     at = ", ".join(f"{one:.3g}" for one in rpm)
-    return f"changes at this cadence are not observed yet; at {at} rpm they are"
+    return f"changes at this cadence cannot be observed yet, but they can at {at} rpm"
 
 
 def _is_changing(state: TorqueState) -> bool:
@@ -133,8 +131,8 @@ def _other_cadence(state: TorqueState, references: References) -> str:
     if _is_changing(state):
         now = f", now {abs(state.waiting[-1].profile.cadence_rpm):.3g} rpm" if state.waiting else ""
         return f"not observable while the cadence changes{now}"
-    known = "not observable at this cadence until there is a reference for it"
-    return f"{known}: {references.percent} % are simulated" if references.is_busy else known
+    known = "not observable at this cadence before it has a reference"
+    return f"{known}: {references.percent} % is simulated" if references.is_busy else known
 
 
 def next_step(state: TorqueState, references: References, config: MonitorConfig) -> str:
@@ -146,19 +144,19 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     last = state.waiting[-1:] if state.is_elsewhere else state.cycles[-1:]
     cycle_s = TURN / abs(last[0].profile.speed) if last else commanded_s
     if references.is_late:
-        return f"{_simulated(state)} being simulated, later than in a replay: this machine is too busy"
+        return f"{_simulated(state)} being simulated, with a delay because this machine is too busy"
     if references.is_busy:
         left_s = references.cycles_left * commanded_s
-        then = "; a reference with them follows" if state.is_identifying else ""
+        then = "; then a reference with these values is simulated" if state.is_identifying else ""
         return f"{_simulated(state)} ready in {_cycles(left_s / cycle_s, cycle_s)}{then}"
     if state.reference is None:
-        return f"a reference is chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
+        return f"a reference will be chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
     if state.is_elsewhere:
         left = UNLIKE_CYCLES - len(state.waiting)
-        return "" if _is_changing(state) else f"a reference for it is begun in {_cycles(left, cycle_s)}"
+        return "" if _is_changing(state) else f"its reference will be started in {_cycles(left, cycle_s)}"
     if state.commissioned is None and not state.changes:
         left = COMMISSIONING_CYCLES - len(state.cycles)
-        return f"a baseline for smaller changes is complete in {_cycles(left, cycle_s)}"
+        return f"a baseline for smaller changes will be complete in {_cycles(left, cycle_s)}"
     return ""
 
 

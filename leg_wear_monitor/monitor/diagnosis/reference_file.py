@@ -199,7 +199,7 @@ def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
     leg = LegParameters(mass, length, friction, compliance, damping, load, load_sigma)
     found = TorqueReference(CrankProfile(speed, cosine, sine), clearance_m, (expected, *torque), leg)
     if (len(torque) - found.of_masses.size - found.of_frictions.size) % joints:
-        raise ValueError(f"its {len(torque)} other legs are not as many for each of {joints} joints")
+        raise ValueError(f"its {len(torque)} other legs are not the same number for each of {joints} joints")
     return found
 
 

@@ -36,7 +36,7 @@ from leg_wear_monitor.twin.references import (
     levels_of,
 )
 
-# Models that follow from the state of a `TorqueObserver`: explanations, tests and the misfit.
+# Models that follow from the state of a `TorqueObserver`: explanations, tests and the residual.
 #
 # They are computed when first used, and again after their inputs have changed.
 
@@ -44,20 +44,21 @@ from leg_wear_monitor.twin.references import (
 COMMISSIONING_CYCLES = 50  # gait cycles of a baseline: a recording of a minute at 60 rpm has them
 PART_CYCLES = 10  # gait cycles of a baseline that a change ends: a mean and a scatter, in a sixth of a minute
 
-# Misfit above which the name of a joint is not sure: names are right up to a misfit of 3 in the air, partly
-# wrong at 23 with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md).
+# Residual above which the name of a joint is not sure: names are right up to a residual of 3 in the air,
+# partly wrong at 23 with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md).
 NAMED_TO = 5.0
 
-# A channel that makes the misfit this many times as large is refused, because it stands for wrong lengths: 5
+# A channel that makes the residual this many times as large is refused, because it indicates wrong lengths: 5
 # times for leg c of benchmarks/diagnosis.py, whose lengths are 1 % off; true channels at most 1.9 times
 # (under 300 N of load).
 _CHANNEL_MISFIT_FACTOR = 2.5
 
-# misfit up to which a leg on the ground matches its reference once it was identified: other shapes of the
+# residual up to which a leg on the ground matches its reference once it was identified: other shapes of the
 # force leave 1.2 to 1.5. Before, twice the friction in the joints left 1.1, and G was taken for B
 _UNLIKE_ON_GROUND = 2.0
 
-# misfit up to which a leg matches, and a clearance is corrected: I was taken for J at 0.68, J for I at 0.78
+# largest residual of a matching leg whose clearances are corrected; I was taken for J at 0.68, J for I at
+# 0.78
 CORRECTED_TO = 0.65
 
 _MOST_KEPT = 3  # latest sets of models: a baseline or a sensor that is tried, and the former one
@@ -185,7 +186,7 @@ class LegModels:
         return self.misfit(state) < (_UNLIKE_ON_GROUND if is_shape else CORRECTED_TO)
 
     def is_sure(self, state: TorqueState) -> bool:
-        """True if a clearance may be corrected: the leg is known, and its drive passes enough."""
+        """True if a clearance may be corrected: the leg is known, and its drive passes enough harmonics."""
         return not state.is_load_other and self.is_of_file(state) and not state.is_narrow
 
 

@@ -204,8 +204,8 @@ LAST_CYCLES = 10  # gait cycles whose mean temperature is the present temperatur
 # per gait cycle: where a drive passed 11 and 13, I was taken for J; with 17 and more, no joint was
 _LEAST_HARMONICS = 15.0
 FIRST_CYCLES = 5  # gait cycles before the first reference is chosen
-UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
-UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
+UNUSABLE_CYCLES = 3  # number in a row, because a start has two cycles unlike the rest
+UNUSED_CYCLES = 20  # number in a row after which a result no longer describes the present gait
 
 
 class SignedCycle(NamedTuple):
@@ -420,7 +420,7 @@ class TorqueState:
         """The baseline of the sensor at a speed of the crank; it is removed from the stored baselines.
 
         Forces of inertia depend on the speed: compared with the baseline of 60 rpm, a healthy leg at 57 rpm
-        had a wide joint A. Roughness depends on the rate, and on how many samples are averaged.
+        seemed to have a loose joint A. Roughness depends on the rate, and on how many samples are averaged.
         """
         alike = (one for one in self.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE)
         own = next((one for one in alike if self.sensor and one.is_of(self.sensor)), None)

@@ -127,7 +127,7 @@ class JointForecast:
     days : Quantiles or None
         Days at the usual duty until then.
     clearance_m : Quantiles or None
-        The clearance now, as far as it is known; None where the verdict does not believe it.
+        The present clearance, as far as it is known; None if the verdict marks it as not valid.
     measurements : int
         Measured clearances of this part that are in it.
     prior : CoefficientPrior or None
@@ -328,7 +328,7 @@ def _legs(
 
 
 def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:
-    """Remaining life in cycles, hours and days; ``day`` (n,) days of a cycle."""
+    """Remaining life in cycles, hours and days; ``day`` (n,) is the length of a cycle in days."""
     if answer not in (Answer.KNOWN, Answer.PARTLY_KNOWN, Answer.AT_LIMIT):
         return dict.fromkeys(("cycles", "hours", "days"))
     hours = cycles * (cycle_s / 3600.0)
@@ -581,7 +581,7 @@ class Forecaster:
         return now
 
     def best_estimate_m(self, k: int, modelled_m: float) -> float:
-        """Median of the clearance of joint k by counting and measurements; NaN without a measurement."""
+        """Median of the clearance of joint k from wear model and measurements; NaN without a measurement."""
         estimate = self.coefficient_estimates[k]
         return estimate.clearance_m(modelled_m - self._fresh_m[k]) if estimate.observations else math.nan
 

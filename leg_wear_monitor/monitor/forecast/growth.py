@@ -203,7 +203,7 @@ def model_error(
     if load_sigma:
         force = (1.0 + load_sigma) * np.array(mechanism.loads[GROUND_LOAD].force)
         load = np.abs(_force_times_sliding(with_toe_force(mechanism, force), speed_radps) - sliding)
-    # a joint that carries nothing on paper: all of its growth is made by impacts
+    # a joint without load in the ideal leg: impacts cause all of its growth
     sensitivity, load = (
         np.divide(change, sliding, out=np.zeros_like(sliding), where=sliding > 0.0)
         for change in (np.sqrt(square), load)

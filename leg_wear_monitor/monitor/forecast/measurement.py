@@ -130,9 +130,9 @@ class MeasurementResult:
         if self.eased:
             lines.append(f"the alarm clearance {now.joint} that an earlier measurement raised {self.eased}")
         lines += self._compared()
-        if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
+        if self.agrees and self.contradicts:  # the wear model is wrong, not the measurement
             used = "uses" if now.counts else "does not use"
-            lines.append(f"the joint has not opened as modelled; the forecast {used} the measurement")
+            lines.append(f"the joint has not worn as modelled; the forecast {used} the measurement")
             lines += self.words[-1:] if now.counts else []
             return (*lines, validity([*self.earlier, now]))
         return (*lines, *self.words, validity([*self.earlier, now]))
@@ -165,7 +165,7 @@ def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: 
 def judged_clearance_m(
     modelled_m: float, measured: Measurement | None, best_estimate_m: float = math.nan
 ) -> float:
-    """Clearance that is compared with the limit: the modelled one, or a larger one by measurement.
+    """Clearance to compare with the limit: the modelled clearance, or a larger measured clearance.
 
     Parameters
     ----------
@@ -286,18 +286,18 @@ def _clock(stamp_ns: int, kept_ns: int) -> list[str]:
         return []
     return [
         f"the clock is {(kept_ns - stamp_ns) / 3.6e12:.3g} h before the ledger's last entry; "
-        "the measurement counts for the wear that is in the ledger now"
+        "the measurement is assigned to the wear that is in the ledger now"
     ]
 
 
 def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     more = "larger" if below > 0.5 else "smaller"
-    done = "it counts, as requested" if accept else "it is kept in the ledger, but does not count"
+    done = "it is used, as requested" if accept else "it is stored in the ledger, but not used"
     last = "" if accept else "; if the measurement is correct, use --accept"
     return [
         f"this contradicts the model: the clearance of {joint} is far {more} than possible; {done}",
-        "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
-        f"other than configured, correct that{last}",
+        "measure again; if the part was replaced, reset its wear first; if the load or the clearance "
+        f"when new is wrong in the configuration, correct it{last}",
     ]
 
 
@@ -318,7 +318,7 @@ def _change(before: CoefficientEstimate, after: CoefficientEstimate, doubted_per
     if middle * doubted_per_pa <= _MOST_PER_PA:
         return line
     return (
-        f"{line}; that is {middle * doubted_per_pa:.2g} 1/Pa, usually below {_MOST_PER_PA:g} 1/Pa: the "
-        "joint has not opened by wear alone, and the forecast is far too short; withdraw the measurement "
+        f"{line}; that is {middle * doubted_per_pa:.2g} 1/Pa, usually below {_MOST_PER_PA:g} 1/Pa: wear "
+        "alone cannot explain this clearance, and the forecast is far too short; withdraw the measurement "
         "and enter it without --accept"
     )

@@ -68,7 +68,8 @@ def coefficient_doubts(counted: Iterable[JointWear], leg: Mechanism) -> tuple[Do
     return tuple(
         Doubt(
             f"wear coefficient of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}",
-            f"{now:.4g} 1/Pa (bushing and journal together), and the wear in the ledger was counted with "
+            f"{now:.4g} 1/Pa (bushing and journal together), but the wear in the ledger was modelled "
+            f"with "
             f"{was:.4g} 1/Pa; that wear stays as modelled, {_further(was, now)}",
         )
         for (was, now), joints in found.items()
@@ -249,7 +250,7 @@ def estimate_coefficient(
     prior = prior or usual_prior()
     mean, precision = measured_factor(settings, fresh_m, observations, corrections)
     if math.sqrt(precision) * mean * prior.sigma < 1.0:
-        # nothing is known better than the nominal coefficient: a new one says nothing of the wear before it
+        # only the nominal coefficient is known, because a new coefficient does not describe earlier wear
         corrections = [one for one in corrections if not isinstance(one, CoefficientSpan)]
         mean, precision = measured_factor(settings, fresh_m, observations, corrections)
     log_factor, log_weight = posterior_grid(prior, mean, precision)

@@ -138,7 +138,7 @@ class Run:
     boot_id : str
         Boot of the computer; empty if unknown.
     spans : tuple of (int, int, int)
-        Begin and end [ns] of the time spans whose wear is counted, and their clock epochs.
+        Begin and end [ns] of the time spans whose wear is modelled, and their clock epochs.
     loads : tuple of WalkedLoad
         Foot loads that acted.
     """
@@ -239,14 +239,14 @@ class Entry:
     Attributes
     ----------
     stamp_ns : int
-        Stamp up to which the wear is counted.
+        Stamp up to which the wear is modelled.
     joints : tuple of JointWear
     totals : dict of str to float
         Counters over all runs, and values in force such as `clearance_limit_key`; each name ends in the unit.
     alarms : tuple of Alarm
         Those that are not OK.
     spans : tuple of (int, int, int)
-        Begin and end [ns] of the time spans of this run whose wear is counted, and their clock epochs.
+        Begin and end [ns] of the time spans of this run whose wear is modelled, and their clock epochs.
     loads : tuple of WalkedLoad
         Foot loads that acted in this run.
     """
@@ -375,13 +375,13 @@ class CorrectedClearance:
     stamp_ns : int
     joint : str
     clearance_m : float
-        Mean radial clearance from then on.
+        Mean radial clearance after the correction.
     sigma_m : float
         Its standard deviation.
     before_m : float
         Modelled wear of this part.
     wear_m : float
-        Wear in the twin from then on, which makes the clearance this one.
+        Wear in the twin after the correction, which gives this clearance.
     replaced_ns : int
         When the part was replaced, 0 if it never was.
     """
@@ -424,7 +424,7 @@ Recount = CorrectedClearance | CoefficientSpan
 def coefficient_spans(
     states: Iterable[JointWear], now_per_pa: Mapping[str, float]
 ) -> tuple[CoefficientSpan, ...]:
-    """Wear that was modelled with other coefficients than the present ones; none if one is not known.
+    """Wear that was modelled with other coefficients than the present coefficients; none if one is unknown.
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ def column_type(kind: Any) -> str:
     """Type of the column of a field."""
     if _is_array(kind):
         return "BLOB"
-    if isinstance(kind, type) and issubclass(kind, int):  # flags and levels as well
+    if isinstance(kind, type) and issubclass(kind, int):  # INTEGER is for flags and levels as well
         return "INTEGER"
     return "REAL" if kind is float else "TEXT"
 
@@ -228,7 +228,7 @@ def _checksum(db: sqlite3.Connection, stamp_ns: int, run: int) -> int:
 def write_event(db: sqlite3.Connection, event: Event) -> None:
     """Append an event; to be called within a transaction.
 
-    A measurement that already has a row is a withdrawn one: its row says so from then on. A reset, and its
+    If a measurement already has a row, it was withdrawn, and the row is updated. A reset, and its
     undoing, delete the signatures of the drive torque, because they belong to different clearances. The
     stamps cannot order them: stamps of recordings come from a different clock than the operator's.
     """
@@ -397,7 +397,7 @@ def copy_of(path: str | Path) -> Iterator[Path]:
 
 
 def _create(path: Path, binding: Binding) -> None:
-    """Create a ledger without wear; even if this is cut off, the path has no ledger or a complete one."""
+    """Create a ledger without wear; after an interruption, the path has no ledger or a complete ledger."""
     new = path.with_name(f"{path.name}.new")
     try:
         new.unlink(missing_ok=True)

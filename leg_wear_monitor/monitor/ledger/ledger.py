@@ -93,7 +93,7 @@ class LedgerContent:
 
     @property
     def counted_ns(self) -> Ints:
-        """Begin and end (n, 2) [ns] of the time spans whose wear is counted, in all epochs."""
+        """Begin and end (n, 2) [ns] of the time spans whose wear is modelled, in all epochs."""
         spans = {span[:2] for run in self.runs for span in run.spans}
         return np.array(sorted(spans), dtype=np.int64).reshape(-1, 2)
 

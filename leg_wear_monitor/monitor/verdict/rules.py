@@ -1,4 +1,4 @@
-"""The verdict of a situation by all rules; the most severe one that holds decides, the first of equals.
+"""The verdict of a situation by all rules: the most severe rule that applies decides, the first of equals.
 
 A rule is a row of config/verdict.yaml and a condition: the cases in a situation for which it holds.
 docs/reference/monitor.md lists the rules; a test compares the two.
@@ -94,15 +94,15 @@ def evidence_of(one: NamedCause) -> Evidence:
 def explanation(explained: TorqueExplanation, found: Diagnosis | None = None) -> str:
     """Alternatives that explain a torque residual, with their values and the unexplained rest."""
     rest = estimate(explained.after, explained.after_sigma, "")
-    left = f"{rest} of the predicted RMS remains unexplained: the mechanism or a clearance may have changed"
+    left = f"{rest} of the predicted RMS stays unexplained: the mechanism or a clearance may have changed"
     if not explained.alternatives:
-        return f"no fault of the sensors, load or mass explains half of it; {left}"
+        return f"no fault of a sensor, a load or a mass explains half of the difference; {left}"
     alternatives = [
         " and ".join(sentence(one, found) for one in causes) for causes in explained.alternatives[:_MOST]
     ]
     words = ", or ".join(alternatives)
     if len(alternatives) > 1:
-        words += " (these explain the torque equally well)"
+        words += " (each explains the torque equally well)"
     if abs(explained.bias.value) > _SURE * explained.bias.sigma:
         words += f"; {sentence(explained.bias, found)}"
     return words if explained.is_whole else f"{words}; {left}"
@@ -189,7 +189,7 @@ _KNOWN_BY = {MEASURED: "measured", BOTH: "estimated"}
 
 
 def hit_of(alarm: Alarm, situation: Situation) -> Hit:
-    """An alarm as a case of a rule: its last value if that is beyond the limit, else its worst one."""
+    """An alarm as a case of a rule: its last value if that is beyond the limit, otherwise its worst value."""
     is_present = alarm.present is alarm.level  # after a level has fallen, the value is within the limit
     is_known = is_present and not math.isnan(alarm.value)
     value, past = alarm.worst, ""
@@ -198,7 +198,7 @@ def hit_of(alarm: Alarm, situation: Situation) -> Hit:
     elif is_known:  # the value is within the limit, but not by the deadband
         past = f", {amount(alarm.value, alarm.unit)} now"
     if not is_present:
-        past = f" (since {time_words(alarm.raised_ns)}; now within its limit)"
+        past = f" (since {time_words(alarm.raised_ns)}; now within the limit)"
     own = joint_of(alarm.name)
     noun = QUANTITIES.get(alarm.name) or QUANTITIES.get(alarm.kind) or alarm.name.replace("_", " ")
     joint = situation.joint_words(own)
@@ -261,7 +261,7 @@ def _beyond_limits(code: str, situation: Situation) -> list[Hit]:
     kinds = [kind for kind, cause in CAUSES_OF_ALARMS.items() if cause.fault_code == code]
     hits = []
     for hit in raised(*kinds)(situation) if kinds else ():
-        alarm = hit.evidence[0].name  # the evidence of a raised alarm is the alarm's value, by its name
+        alarm = hit.evidence[0].name  # the evidence of a raised alarm is its value, under its name
         cause = situation.torque_causes.get(alarm)
         words = ": the {quantity} is {value} (limit {limit}){past}".format(**hit.words)
         words += f"; {sentence(cause, situation.diagnosis)}" if cause else ""
@@ -310,19 +310,19 @@ def changes(situation: Situation) -> tuple[Change, ...]:
 
 
 def words_of(change: Change, situation: Situation) -> str:
-    """Text for a change, such as ``clearance of 0.62 mm in joint G``, with the change since the baseline."""
+    """Text for a change, such as ``clearance of 0.62 mm in joint G instead of the modelled 0.3 mm``."""
     if change.cause is Cause.CLEARANCE:
         opened = estimate(change.value - change.counted, change.sigma, "m")
-        value, counted = amount(change.value, "m"), amount(change.counted, "m")
-        verb, joint = "was" if change.is_corrected else "is", situation.joint_words(change.subject)
-        words = f"clearance of {value} in joint {joint} ({counted} {verb} modelled; the change is {opened})"
+        value, modelled = amount(change.value, "m"), amount(change.counted, "m")
+        joint = situation.joint_words(change.subject)
+        words = f"clearance of {value} in joint {joint} instead of the modelled {modelled} (change {opened})"
         if change.value < change.counted:
-            words += ", less than before: if its part was replaced, reset the joint"
+            words += "; this is less than before: if the part was replaced, reset the joint"
     elif change.cause is Cause.SEVERAL:
         names = [situation.joint_words(one.subject) for one in change.joints]
         sizes = [estimate(one.value, one.sigma, "m") for one in change.joints]
         joints = map(" ".join, zip(names, sizes, strict=True))
-        words = f"change of several joints: {' and '.join(joints)}"
+        words = f"change in several joints: {' and '.join(joints)}"
     else:
         words = sentence(change, situation.diagnosis)
     return f"{words} (or {change.runner_up})" if change.runner_up and not change.is_named else words
@@ -371,7 +371,7 @@ def modelled_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def _forecast_m(each: JointSituation) -> float:
-    """Clearance of a joint in the forecast; without measurements, it is the modelled one a minute later."""
+    """Clearance of a joint in the forecast; without measurements, the modelled clearance a minute later."""
     return each.best_estimate_m if each.is_used or each.is_measurement_used else each.modelled_m
 
 
@@ -391,7 +391,7 @@ def detected_at_limit(situation: Situation) -> Sequence[Hit]:
             continue
         past, unsure = doubt(situation) if seen.by == "torque" else "", ""
         if seen not in each.seen:
-            past = f" (since {time_words(raised_ns)}; not estimated now)"
+            past = f" (since {time_words(raised_ns)}; no estimate is available now)"
         if each.measured is not None:
             unsure = f"; {each.measured.words} was measured"
         words = {
@@ -407,7 +407,7 @@ def detected_at_limit(situation: Situation) -> Sequence[Hit]:
 
 
 def replaced(situation: Situation) -> Sequence[Hit]:
-    """Joints whose part is so new that neither gait cycles nor sensors confirm the repair yet."""
+    """Joints with a new part whose repair neither gait cycles nor sensors have confirmed yet."""
     is_as_modelled = situation.diagnosis.state is DiagnosisState.AS_MODELLED
     return [
         Hit(
@@ -426,7 +426,7 @@ def replaced(situation: Situation) -> Sequence[Hit]:
 
 
 def departing(situation: Situation) -> Sequence[Hit]:
-    """Joints whose clearance by encoders differs from the modelled one; the forecast may use it."""
+    """Joints whose clearance from encoders differs from the modelled clearance; the forecast may use it."""
     used = {each.joint for each in situation.joints if each.is_used}
     return [
         hit if hit.joint in used else attrs.evolve(hit, not_valid=(Figure.FORECAST,))
@@ -473,7 +473,7 @@ def no_cycle(situation: Situation) -> Sequence[Hit]:
 
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:
-    """The cadence is outside of its tolerance, or was for so long that its alarm is raised."""
+    """The cadence is outside of its tolerance, or was outside long enough to raise its alarm."""
     notes, alarms = situation.notes.get("CADENCE", ()), raised("cadence")(situation)
     if not notes and not alarms:
         return []
@@ -549,10 +549,10 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
     ]
     known = [each for each in found.sigma_m if not math.isnan(each)]
     if found.state is DiagnosisState.OFF and found.reason:
-        observed.append(f"the torque is not compared with wider joints: {found.reason}")
+        observed.append(f"no clearance is estimated from the torque: {found.reason}")
     elif known:
-        since = "changes since the baseline" if found.baseline_m else "changes from the modelled clearances"
-        observed.append(f"{since} are known to ± {amount(max(known), 'm')} after {found.cycles} gait cycles")
+        what = "clearance changes since the baseline" if found.baseline_m else "clearances"
+        observed.append(f"{what} are known to ± {amount(max(known), 'm')} after {found.cycles} gait cycles")
     observed += filter(None, (found.next_step,))
     evidence = (Evidence("torque_mismatch", rest, limit, ""),)
     return [Hit(words={"observed": "; ".join(observed), "advice": ADVICE}, evidence=evidence)]
@@ -615,7 +615,7 @@ def findings(situation: Situation) -> tuple[Verdict, ...]:
 
 
 def _finding(code: str, rule: Rule, hits: Sequence[Hit], situation: Situation) -> Verdict:
-    """The verdict by one rule alone, with all of its cases."""
+    """The verdict by a single rule, with all of its cases."""
     joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
     not_valid = {*rule.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
     words = {"joints": situation.joints_words(joints), **hits[0].words, "joint": hits[0].joint}

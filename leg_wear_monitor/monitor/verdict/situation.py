@@ -22,7 +22,7 @@ ACTS = "FOOT_LOAD"
 
 @attrs.frozen
 class KnownClearance:
-    """A clearance, and who says so.
+    """A clearance and its source.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ SOURCES = {
 
 
 def judged(joint: JointSituation) -> KnownClearance:
-    """The modelled clearance, or a larger one by measurement: a finding on the leg counts."""
+    """The modelled clearance, or a larger measured clearance, because a measurement on the leg counts."""
     found = [KnownClearance(COUNTED, joint.modelled_m, math.nan)]
     if joint.measured is not None:
         found.append(joint.measured)
@@ -196,7 +196,7 @@ def surest(seen: Iterable[KnownClearance]) -> KnownClearance | None:
 
 
 def surely_at(limit_m: float, seen: Sequence[KnownClearance]) -> KnownClearance | None:
-    """The surest of the estimates that are surely beyond a limit; None without one."""
+    """The most certain estimate that is surely beyond a limit; None if there is no such estimate."""
     return surest(one for one in seen if one.least_m >= limit_m)
 
 

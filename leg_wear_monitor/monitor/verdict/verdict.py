@@ -147,7 +147,7 @@ class MeasuredFigure:
 
     @property
     def text(self) -> str:
-        """Such as ``99 of 100 such findings are right on simulated legs``."""
+        """Such as ``99 of 100 such verdicts were right in tests on simulated legs``."""
         is_long = self.of is not None and self.of > _HUNDRED and self.right != self.of
         counted = f"{int(_HUNDRED * self.right / (self.of or 1))} of {_HUNDRED}" if is_long else self.counted
         return f"{counted} {self.words}"
@@ -214,7 +214,7 @@ def _with_phrases(text: str) -> str:
 
 
 def words_of_cause(cause: Cause) -> CauseWords:
-    """Words of a cause other than a clearance."""
+    """Texts for a cause other than a clearance."""
     return table().causes[cause.name]
 
 
@@ -244,7 +244,7 @@ def guide_to(verdict: Verdict) -> str:
 
 
 def verdict_of(findings: Sequence[Verdict]) -> Verdict:
-    """Verdict of at least one rule's: the first of the most severe ones is its reason."""
+    """The verdict of at least one finding; the first of the most severe findings gives the reason."""
     lead = max(findings, key=lambda finding: finding.state.severity)
     evidence: dict[str, Evidence] = {}
     for each in (each for finding in (lead, *findings) for each in finding.evidence):
@@ -262,7 +262,7 @@ def verdict_of(findings: Sequence[Verdict]) -> Verdict:
 
 
 def dated(findings: Iterable[Verdict], before: Iterable[Verdict], stamp_ns: int) -> tuple[Verdict, ...]:
-    """Findings with the stamp since which each holds: its own, the same earlier one's, or the given stamp."""
+    """Findings with their start: their own, the start of the same earlier finding, or the given stamp."""
     known = {each.fault_code: each.since_ns for each in before}
     return tuple(
         attrs.evolve(each, since_ns=each.since_ns or known.get(each.fault_code) or stamp_ns)
@@ -332,7 +332,7 @@ def how_soon(state: LegState) -> str:
 
 
 def how_sure(state: LegState) -> str:
-    """How often such a verdict is right; says so if nothing was measured on a leg like this."""
+    """How often such a verdict was right in tests, or a note if this was never measured on such a leg."""
     rule, known = _rule(state), table()
     measured = "; ".join(figure.text for figure in figures_of(state))
     return measured or known.how_sure[rule.sure or known.advice[rule.advice].sure]

@@ -24,8 +24,8 @@ from leg_wear_monitor.report.page import (
 from leg_wear_monitor.report.replay.joints import SIGMAS
 from leg_wear_monitor.state import Figure
 
-_STEADY = 0.1  # fraction of the commanded cadence: small changes do not fill the picture
-_NEAR = 3.0  # a limit further than so many times the largest value would only flatten the curve
+_STEADY = 0.1  # fraction of the commanded cadence: small changes must not fill the picture
+_NEAR = 3.0  # a limit above this multiple of the largest value would only flatten the curve
 
 
 def _over_time(
@@ -57,7 +57,7 @@ def health_chart(summary: ReplaySummary) -> Chart:
     steady = _STEADY * abs(rpm)
 
     def known(name: str, unit: str, column: str, colour: str = "--series-0") -> list[Series]:
-        """A series, with its smallest and largest values where it is thinned."""
+        """A series; if it is thinned, with its smallest and largest values."""
         series = Series(name, unit, getattr(history, column), colour)
         ends = (("lowest", history.lowest), ("highest", history.highest))
         return [
@@ -83,7 +83,7 @@ def health_chart(summary: ReplaySummary) -> Chart:
         ),
         Panel("Drive torque, RMS of each gait cycle", torque, low=0.0),
         Panel(
-            "Fraction of the torque that is not explained",
+            "Unexplained fraction of the torque",
             [*mismatch, _limit("limit", "", limit, history.torque_mismatch)],
             low=0.0,
             high=max(1.1 * max(limit, _greatest(history.torque_mismatch)), _greatest(*mismatches)),
@@ -133,7 +133,7 @@ def joint_trends(summary: ReplaySummary, joint: str) -> list[Part]:
         return doubts
     caption = (
         "Mean radial clearance; the band is the estimate by encoders or the drive torque ± two "
-        "standard deviations. Contact force in each gait cycle: peaks are of a heavy tail."
+        "standard deviations. Contact force in each gait cycle: single peaks are random."
     )
     words = f"Joint {summary.leg.joint_words(joint)}"
     return [_over_time(summary, f"joint_{joint}", words, caption, panels), *doubts]
@@ -208,8 +208,8 @@ def _table(summary: ReplaySummary) -> Table:
         head=(*head, "growth [pm/cycle]", "± [pm/cycle]"),
         rows=rows,
         note="Modelled: the clearance when new plus the modelled wear. Estimated: from the drive torque or "
-        "the encoders. Measured: by hand. ± is one standard deviation of the growth: gait cycles of a "
-        "chaotic motion scatter, and the leg may have other masses than its file.",
+        "the encoders. Measured: by hand. ± is one standard deviation of the growth: gait cycles "
+        "scatter, and the leg may differ from its file.",
     )
 
 

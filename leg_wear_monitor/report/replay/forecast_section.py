@@ -57,8 +57,8 @@ def _table(summary: ReplaySummary) -> Table:
         rows=rows,
         note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
         f"A day of duty has {summary.monitor.duty_hours_per_day:g} h of walking. "
-        "Clearance: p10 to p90 of the present clearance. First: probability of this "
-        "joint to be the first at its limit, which ends the leg's life.",
+        "Clearance: p10 to p90 of the present clearance. First: probability that this joint is the first "
+        "at its limit, which ends the life of the leg.",
     )
 
 
@@ -118,15 +118,15 @@ def _validity(measurements: Sequence[Measurement]) -> Chart:
     )
 
 
-# Wear around each bushing and journal, on an axis that shows it in its size.
+# Wear around each bushing and journal, on an axis that shows its true size.
 
 
-_LEAST_M = 1.0e-6  # end of the depth axis: less wear than this does not fill the picture
+_LEAST_M = 1.0e-6  # least length of the depth axis, so that small wear does not fill the picture
 _TITLE = "Wear around each bushing"
 
 
 def wear_section(summary: ReplaySummary) -> Section:
-    """Depth over the angle, a panel a joint, all on the same axis."""
+    """Depth over the angle, one panel per joint, all on the same axis."""
     doubt = not_valid(summary.verdict, Figure.CLEARANCES)
     if doubt:
         return Section(_TITLE, [Text(doubt, is_not_valid=True)], is_folded=True)

@@ -1,4 +1,4 @@
-"""The clearance joints of a replay: a row each, and their marks in a drawing of the leg."""
+"""The clearance joints of a replay: one row per joint, and the marks in the drawing of the leg."""
 
 import math
 import textwrap
@@ -91,7 +91,7 @@ def _look(summary: ReplaySummary, joint: str, clearance: JointClearance | None, 
     return "near" if used >= _NEAR or clearance.best_estimate_m >= warn_m > clearance.new_m else "fine"
 
 
-# A row a joint: clearance against limit, remaining life and alarms, on common axes.
+# One row per joint: clearance against limit, remaining life and alarms, on common axes.
 
 
 SIGMAS = 2.0  # drawn to either side of an estimate
@@ -132,7 +132,7 @@ def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> str:
 
 
 def _holds_for(summary: ReplaySummary) -> list[str]:
-    """Regimes that the remaining lives hold for, a sentence each."""
+    """Wear regimes for which the remaining lives are valid, one sentence per regime."""
     priors = [joint.forecast.prior for joint in summary.joints.values() if joint.forecast]
     regimes = dict.fromkeys(prior.holds_for for prior in priors if prior)
     return [f"It holds for {', '.join(regimes)}."] if regimes else []
@@ -160,7 +160,7 @@ def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, s
 
 
 def _most(views: Sequence[JointView]) -> float:
-    """End of the axis of all bars, in wear allowances: all joints and limits, up to a length."""
+    """End of the axis of all bars, in wear allowances; it includes all joints and limits, up to a bound."""
     ends = [end for view in views if (ends := _ends(view)) for end in ends]
     return min(max([1.1, *ends]), _MOST_ALLOWANCES)
 
@@ -259,7 +259,7 @@ _NEAR_M = 1.0e-3
 
 
 def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
-    """Markup of the drawing; of a note instead for a summary without the leg's shape."""
+    """Markup of the drawing, or of a note if the summary has no shape of the leg."""
     leg = summary.leg
     if not leg.bodies_m or not leg.joints:
         return render("replay/leg.html", drawing=None)
@@ -275,7 +275,7 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
         return round(x, 1), round(y, 1)
 
     def beside(view: JointView) -> Place:
-        """A joint's place; joints that share one stand side by side."""
+        """Place of a joint; joints at the same place stand side by side."""
         here = leg.joints[view.joint].place_m
         there = [other.joint for other in drawn if _is_near(leg.joints[other.joint].place_m, here)]
         x, y = at(here)
@@ -301,7 +301,7 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
 
 
 def _marks(placed: Sequence[tuple[JointView, float, float]], height: float) -> list[dict[str, Any]]:
-    """Marks with their labels in a column, from the highest joint to the lowest, and not over each other."""
+    """Marks with their labels in a column, from the highest joint to the lowest, without overlap."""
     marks, below = [], 0.0
     lines = {view.joint: _lines(view.label) for view, _, _ in placed}
     more = {joint: 0.5 * _LINE * max(0, len(each) - 1) for joint, each in lines.items()}

@@ -1,4 +1,4 @@
-"""The page of a replay, from its summary: a first screen that answers, and the rest folded below it."""
+"""The page of a replay, from its summary: the answer on the first screen, and the rest folded below."""
 
 import math
 
@@ -49,7 +49,7 @@ MOST_ROWS = 50
 
 
 def raised_alarms(summary: ReplaySummary, otherwise: str) -> str:
-    """Markup of every alarm that is raised; a sentence without any."""
+    """Markup of every raised alarm, or a sentence that no alarm is raised."""
     raised = [_raised(summary, alarm) for alarm in summary.alarms.now if alarm.level is not Level.OK]
     return render("replay/alarms.html", alarms=raised, advice=summary.advice, otherwise=otherwise)
 
@@ -85,7 +85,7 @@ def _source(known: JointClearance | None, clearance_m: float | None) -> str | No
 
 
 def _alarm_doubt(summary: ReplaySummary, alarm: LegAlarm) -> str:
-    """Why the value of an alarm does not hold; empty if it does: an estimate, or the reason of a verdict."""
+    """Why the value of an alarm is invalid: an estimate, or the reason of a verdict; else empty."""
     if alarm.name in (each.name for each in summary.verdict.evidence[:1]):
         return ""
     kind, _, subject = alarm.name.partition(" ")
@@ -166,7 +166,7 @@ def recording_section(recording: ReplayRecording) -> Section:
         more = len(findings) - MOST_ROWS
         parts.append(Sentences(findings[:MOST_ROWS] + ([f"and {more} more"] if more > 0 else [])))
     else:
-        parts.append(Text("It was read completely."))
+        parts.append(Text("The recording was read completely."))
     return Section("The recording", parts, is_folded=True)
 
 
@@ -179,7 +179,7 @@ _MEASURE = "docs/howto/measure_clearance.md"
 def guide_sections(summary: ReplaySummary) -> list[Section]:
     """Step-by-step instructions, folded: the guide of the verdict, and how to measure a clearance.
 
-    They are in the page, since it may be read where the package is not installed.
+    The page contains them, because it may be read where the package is not installed.
     """
     guides = [enclosed(share_directory() / name) for name in (guide_to(summary.verdict), _MEASURE)]
     return [
@@ -192,7 +192,7 @@ def certainty_section(summary: ReplaySummary) -> Section:
     """The data used to measure the verdict's certainty."""
     rows = [(each.counted, each.words, each.where, each.date, each.source) for each in figures_of(summary)]
     table = Table(
-        caption="How often such a verdict is right, where the truth is known",
+        caption="How often such verdicts were right in tests with a known truth",
         head=("cases", "", "measured on", "date", "page of the package"),
         rows=rows,
         note="Nothing was measured on a real leg.",
@@ -286,7 +286,7 @@ def _model(summary: ReplaySummary) -> _Card:
         level = Level.ERROR if Figure.CLEARANCES in invalid else Level.WARN
         why = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
     elif not why[0]:
-        level, why = Level.WARN, ["no measurement is compared with it"]
+        level, why = Level.WARN, ["no measurement checks it"]
     elif _unexplained(summary) > summary.monitor.limits.torque_mismatch:
         level = Level.WARN
     if gait.doubtful_cycles:
@@ -319,7 +319,7 @@ def _entered(summary: ReplaySummary) -> list[Part]:
     """Note that the verdict is later than the recording; nothing if it is not."""
     if is_of_recording(summary):
         return []
-    words = "The verdict uses entries or measurements after this recording"
+    words = "The verdict uses ledger entries or measurements that are newer than this recording"
     return [Text(f"{words}; input, torque, cadence, growth and forces are from the recording.")]
 
 
@@ -364,4 +364,4 @@ def _gait_sentences(gait: ReplayGait) -> list[str]:
     if gait.believable_cycles:
         return []
     missing = [f"Missing: {gait.missing}."] if gait.missing else []
-    return ["No gait cycle fits this leg, so forces and wear are not reported.", *missing]
+    return ["No gait cycle fits this leg, so the page has no forces and no wear.", *missing]

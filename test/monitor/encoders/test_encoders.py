@@ -190,7 +190,7 @@ def test_an_encoder_on_another_joint_than_said_is_reported(new_watch, read):
     samples = read(3.5)
     samples["encoder_rad"][:, 2] *= -1.0
     monitor.update(samples)
-    assert "ankle does not turn as joint I does" in status_of(monitor, "encoders").message
+    assert "ankle does not turn like joint I" in status_of(monitor, "encoders").message
 
 
 def test_other_encoders_are_commissioned_again_and_the_same_ones_are_not(begin, read, tmp_path):

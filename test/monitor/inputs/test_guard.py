@@ -187,7 +187,7 @@ def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_t
     stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
     monitor.update(stream)
     status = status_of(monitor, "input")
-    every, first = status.message.split(" samples are not used, ")
+    every, first = status.message.split(" samples are not used; most frequent fault: ")
     unused, total = (int(number) for number in every.split(" of "))
     assert "set header.stamp" in first
     assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))

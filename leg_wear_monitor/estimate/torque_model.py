@@ -8,7 +8,7 @@ from leg_wear_monitor.estimate.body_torques import torque_coefficients
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.load import load_signature
+from leg_wear_monitor.twin.load import load_shape, load_signatures
 
 PHASE_ERROR_RAD = 0.02
 """Standard deviation by which clearances of 0.3 mm in five joints shift the torque's phase."""
@@ -88,4 +88,5 @@ def torque_model(mechanism: Mechanism) -> TorqueModel:
     """
     linkage = build_linkage(mechanism)
     tables = torque_coefficients(linkage, one_cycle(linkage, POINTS, 1.0).q)[0]
-    return TorqueModel(tables, load_signature(linkage)[:-1])
+    (load,) = load_signatures(linkage, [load_shape(linkage)])
+    return TorqueModel(tables, load)

@@ -165,7 +165,8 @@ class FootLoad:
             self.toe_m = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *linkage.mechanism.toe)[1]
         known = self._known
         known = known / (known @ self.rows.up).max() if known.size else stance_shape(linkage)
-        self._force, self.signature[:] = known, load_signature(linkage, known)
+        self._force, signature = known, -(at_points(known) * self.toe_m).sum(axis=1)  # by virtual work
+        self.signature[:] = np.append(signature, signature[0])
 
     def _put(self, force_n: Floats) -> None:
         self.acting_n = force_n
@@ -227,23 +228,11 @@ def shape_torque(linkage: Linkage) -> float:
     return float(np.sqrt(np.mean(np.where(in_stance, np.hypot(*other), 0.0) ** 2)))
 
 
-def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:
-    """Drive torque (POINTS + 1,) [N m/N] for a force on the toe (PHASES, 2); by default in stance.
-
-    Zeros for a mechanism without a toe.
-    """
-    toe = linkage.mechanism.toe
-    if toe is None:
-        return np.zeros(POINTS + 1)
-    (signature,) = load_signatures(linkage, [load_shape(linkage) if force is None else force])
-    return np.append(signature, signature[0])
-
-
 def load_signatures(linkage: Linkage, forces: Sequence[Floats]) -> list[Floats]:
-    """Drive torques (POINTS,) [N m/N] for some forces (PHASES, 2) on the toe of a mechanism."""
+    """Drive torques (POINTS,) [N m/N] for some forces (PHASES, 2) on the toe; zeros without a toe."""
     toe = linkage.mechanism.toe
     if toe is None:
-        raise RuntimeError("a mechanism without a toe carries no load")
+        return [np.zeros(POINTS)] * len(forces)
     _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
     return [-(at_points(force) * velocity).sum(axis=1) for force in forces]
 

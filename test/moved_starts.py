@@ -38,8 +38,8 @@ def move_starts(seed: int) -> None:
         state.e[:] = moved(state.e).ravel()
         return state
 
-    def moved_full_state(q, v, clearance_joints, t=0.0):
-        return full_state(factor * q, factor * v, clearance_joints, t)
+    def moved_full_state(q, v, clearance_joints):
+        return full_state(factor * q, factor * v, clearance_joints)
 
     stepper.clearance_state, full_run.full_state = moved_clearance_state, moved_full_state
     ClearanceStepper.set_eccentricities = lambda self, e: _set_eccentricities(self, moved(e))

@@ -75,7 +75,6 @@ from leg_wear_monitor.mechanism.constraints import (
 from leg_wear_monitor.mechanism.position import (
     TURN,
     Linkage,
-    assemble,
     ideal_motion,
     one_cycle,
     point_motion,
@@ -462,10 +461,10 @@ class FullWork(NamedTuple):
     scratch: FullScratch
 
 
-def full_state(q: Floats, v: Floats, clearance_joints: int, t: float = 0.0) -> FullState:
-    """Initial state with open joints at time t [s]: coordinates q (n, 3) and velocities v (n, 3)."""
+def full_state(q: Floats, v: Floats, clearance_joints: int) -> FullState:
+    """Initial state with open joints: coordinates q (n, 3) and velocities v (n, 3)."""
     y = np.concatenate([q.ravel(), v.ravel()])
-    return FullState(y, np.array([t, 1.0e-6]), np.zeros(clearance_joints), np.zeros((clearance_joints, 4)))
+    return FullState(y, np.array([0.0, 1.0e-6]), np.zeros(clearance_joints), np.zeros((clearance_joints, 4)))
 
 
 def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sectors: int) -> FullWork:
@@ -710,10 +709,7 @@ class FullRun:
 
 def _start(setup: Setup) -> FullState:
     """Initial state: the ideal motion at crank angle 0, or at the assembly's angle for a constant torque."""
-    linkage = setup.linkage
-    if not isinstance(linkage.mechanism.drive, TorqueDrive):
-        motion = ideal_motion(linkage, [0.0], setup.speed)
-        return full_state(motion.q[0], motion.v[0], len(setup.clearance_joints))
-    angle = linkage.mechanism.assembly.crank_angle
-    velocity = ideal_motion(linkage, [angle], setup.speed).v[0]
-    return full_state(assemble(linkage), velocity, len(setup.clearance_joints))
+    mechanism = setup.linkage.mechanism
+    angle = mechanism.assembly.crank_angle if isinstance(mechanism.drive, TorqueDrive) else 0.0
+    motion = ideal_motion(setup.linkage, [angle], setup.speed)
+    return full_state(motion.q[0], motion.v[0], len(setup.clearance_joints))

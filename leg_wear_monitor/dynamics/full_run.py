@@ -1,4 +1,4 @@
-"""Time integration in full coordinates: adaptive steps and contact events (physics.md section 2)."""
+"""A leg in full coordinates: equations of motion, adaptive steps, contact events (physics.md section 2)."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Material pairs of bushing and journal: their files, the joints' pairs, load p, v and p v, rating life."""
+"""Figures with their sources: drives, material pairs of bushing and journal, their loads and rating life."""
 
 import math
 from collections.abc import Iterator, Sequence

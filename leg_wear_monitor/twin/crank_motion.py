@@ -1,4 +1,4 @@
-"""Crank motion from filtered samples: spline, rest, tracking state (physics.md section 9).
+"""Crank motion from filtered samples: steps for the leg, filter, spline, rest (physics.md section 9).
 
 A spline node is a crank sample at least a fixed time after the previous node. Once enough later samples have
 arrived, it is smoothed and the leg is advanced to it; the leg is evaluated at all samples up to it.
@@ -20,6 +20,9 @@ from leg_wear_monitor.twin.sample import (
     REORDER_WINDOW_S,
     TrackerSettings,
 )
+
+# Steps: the tracker's instructions to the leg, in the order of stamps.
+
 
 # Codes of steps: set the leg in motion; move it along a polynomial; rest; evaluate it at a sample; stop
 # following; report an event only; push the foot at a sample of its load.

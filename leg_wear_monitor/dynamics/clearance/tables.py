@@ -44,6 +44,9 @@ from leg_wear_monitor.mechanism.position import (
     rotated,
 )
 
+# The linkage near its ideal motion: effects of the eccentricities (physics.md section 7).
+
+
 COARSER = 2  # ratio of the first-order (in e) tables' step to the other tables' step
 
 _NUDGE = 1.0e-5  # m or rad: step of central differences of smooth functions of the coordinates

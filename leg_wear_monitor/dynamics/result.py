@@ -302,8 +302,6 @@ class Trace:
 # Parts of a simulation's result as JSON objects.
 
 
-JsonObject = dict[str, Any]
-
 _OF_EVERY_JOINT = ("mean_force_n", "rms_force_n", "p99_force_n", "max_force_n")
 
 

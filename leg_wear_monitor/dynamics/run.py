@@ -88,8 +88,8 @@ DRIVE_RATES = 3
 # impacts: time it begins [s], approach speed [m/s], time it ends [s], peak normal force [N]
 BEGIN, SPEED, END, PEAK = 0, 1, 2, 3
 IMPACTS = 1000
-# largest deviations from the ideal linkage: toe [m, m/s, m/s^2], drive torque [N m]
-POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
+# index of the drive torque [N m] in the largest deviations from the ideal linkage, after the toe's three
+TORQUE_ERROR = 3
 
 # bins of a histogram: 128 per octave, at most 0.8 % wide, from 2^-20 to 2^30
 _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128

@@ -161,7 +161,7 @@ def _in_worker(parent: int, call: Callable[[], Any]) -> Any:
 def _begin_worker(parent: int) -> None:
     """Set up a worker, once: it leaves interrupts to its parent, and ends with it.
 
-    Without its parent, a worker would go on to write where the next run writes.
+    Without its parent, a worker would continue to write to the files of the next run.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

@@ -220,7 +220,7 @@ def _without_spikes(torque: Series) -> Series:
 
 _LIMIT = "limits.torque_mismatch"
 _LEAST_CYCLES = 8  # gait cycles for a reference: their mean shows how the crank turns
-_LEAST_ANGLES = 40  # crank samples in a gait cycle, for its profile
+_LEAST_ANGLES = 40  # crank samples least number of samples in a gait cycle for its profile
 _LEAST_COMPARED = 10  # gait cycles for a limit
 _MEDIAN_TO_SIGMA = 1.0 / 0.6745  # sigma over the median departure of a normal distribution
 # scatters of a cycle's torque residual from its mean to a warning: by chance less than once in 1e6

@@ -309,7 +309,7 @@ def _check_anchors(text: str, source: str) -> None:
 
 
 def _read_text(path: Path, source: str) -> str:
-    """The file's text; devices are not read, since they may have no end."""
+    """The text of the file; devices are refused, because reading them may never end."""
     try:
         kind = path.stat().st_mode
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):

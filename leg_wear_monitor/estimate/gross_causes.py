@@ -43,7 +43,7 @@ _MODEL_ERROR = 0.02  # fraction of the predicted RMS that even the right causes 
 _MASS_RANGE = (-0.9, 4.0)  # possible error of a body's mass, as a fraction of it
 # bodies whose double mass changes the torque by a smaller fraction of its RMS are not supposed as causes
 _LEAST_MASS_EFFECT = 0.02
-_LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS: far below the torque of a leg in a wrong unit
+_LEAST_FACTOR = 1.0e-5  # fraction of the predicted RMS, far below the torque in a wrong unit
 # angles that are tried, every half degree, from 0 to half a turn and then from minus half a turn to 0
 _GRID_RAD = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
 

@@ -35,7 +35,7 @@ class Series:
 
 
 def series(stamp_ns: NDArray[np.int64], value: Floats, recording: NDArray[np.int64], first_ns: int) -> Series:
-    """Series of the finite values, in order of their stamps; of values with equal stamps, the first one.
+    """Series of the finite values, in order of their stamps; of values with equal stamps, the first.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ DATA_ERRORS = (LegWearError, ArithmeticError, np.linalg.LinAlgError)
 _ROUNDS = 30
 _SHORTEST = 0.001  # smallest tried fraction of a step
 _LESS = 1.0e-9  # fraction by which the square must decrease
-_SMALL = 1.0e-9  # singular values, as a fraction of the largest, that count as none
+_SMALL = 1.0e-9  # singular values below this fraction of the largest count as 0
 
 
 @attrs.frozen(eq=False)

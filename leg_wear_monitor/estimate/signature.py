@@ -20,7 +20,7 @@ SAMPLES = 200  # per gait cycle: faster samples are averaged, since clearances s
 _MOST_PHASES, _LEAST_PHASES = 80, 10
 _IN_PHASE = 2.5  # samples, at least: with fewer, some phases have one only
 _FLOOR = 1.0e-4  # fraction of the torque's size below which roughness is rounding
-_CLIP = 8.0  # times the torque's size: a peak counts as at most this
+_CLIP = 8.0  # upper bound of a peak, as a multiple of the torque's size
 
 
 @attrs.frozen
@@ -488,7 +488,8 @@ _STEEPNESS = np.geomspace(1.0e-4, 1.0e4, 81)
 # to 0.89 of the true change at 1.35 and 1.5 times its clearance, with 4 it is 0.88 to 0.95; with 2, three
 # times as much mere scatter is left for a joint that the torque does not show (2026-11-26)
 _ALIKE = 4.0
-_LEAST_VARIANCE = 1.0e-12  # over the largest: rounding, if fewer cycles than entries were simulated
+# smaller eigenvalues, relative to the largest, are rounding errors if there are fewer cycles than entries
+_LEAST_VARIANCE = 1.0e-12
 
 
 def without_scatter(

@@ -265,7 +265,7 @@ class Fit:
 
     @property
     def gain(self) -> float:
-        """Measured torque per torque on the crank."""
+        """Ratio of measured torque to torque on the crank."""
         return self.linear["gain"]
 
     @property

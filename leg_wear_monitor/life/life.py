@@ -265,12 +265,12 @@ _TRIALS = 4  # attempts to halve a jump before its error is accepted and reporte
 
 @attrs.frozen(kw_only=True)
 class LifeSettings:
-    """How a life is simulated.
+    """Settings of the simulation of a life.
 
     Attributes
     ----------
     legs : int
-        Legs whose wear is averaged, alike but for their start.
+        Number of legs whose wear is averaged; they differ only in their start.
     cycles : int
         Gait cycles of each leg that are averaged before a jump.
     settle_cycles : int

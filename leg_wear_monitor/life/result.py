@@ -47,12 +47,12 @@ def _check(_duty: object, _field: object, hours_by_peak: Mapping[float, float]) 
 
 @attrs.frozen
 class Duty:
-    """Hours a day that a leg walks under each load; only their shares matter for its wear in an hour.
+    """Hours per day that a leg walks under each load; only their proportions affect its wear per hour.
 
     Attributes
     ----------
     hours_by_peak : mapping of float to float
-        Hours a day, by the largest vertical force [N] of the ground on the foot; 0 is the leg in the air.
+        Hours per day, by the largest vertical force [N] of the ground on the foot; 0 is the leg in the air.
 
     Raises
     ------
@@ -185,7 +185,7 @@ class Life:
         return float(self.cycles[-1] + (clearance_m - clearance[-1]) / rate) if rate > 0.0 else np.inf
 
     def end(self, limit_m: float) -> dict[str, dict[str, float | None]]:
-        """When each joint, and the leg as the first of them, reaches a mean clearance.
+        """Time until each joint reaches a mean clearance; for the leg, until the first joint does.
 
         The time has ``cycles``, ``hours`` of walking and, with a duty, ``days``; None if the joint never
         does.

@@ -157,7 +157,7 @@ def far_from_start(linkage: Linkage, q: Floats) -> str:
         return ""
     body = list(linkage.mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
     return (
-        f"{body}: no assembly near the given start: the one found moves this body "
+        f"{body}: no assembly near the given start: the nearest assembly moves this body "
         f"by {moved.max():.2g} (rad or link lengths). Expected at most {_FAR}"
     )
 

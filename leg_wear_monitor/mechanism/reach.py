@@ -37,7 +37,7 @@ class DeadPoint(NamedTuple):
 # Positions of a mechanism over its crank's range: all of them if it works, the possible ones if not.
 
 
-POINTS = 180  # a cycle: smooth to the eye
+POINTS = 180  # positions per cycle, enough to look smooth
 _OPEN_POINTS = 72  # fewer steps for an open mechanism, because its positions take long
 _VISIBLE = 0.02  # fraction of the largest gap
 _CLOSED = 1.0e-9  # gap [m] below which a joint counts as closed

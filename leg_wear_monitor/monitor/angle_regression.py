@@ -291,7 +291,7 @@ class ClearanceEstimate:
 
     @property
     def surely_m(self) -> float:
-        """Size of a significant departure, 0 if there is none; NaN unless it is estimated."""
+        """Size of a significant departure; 0 if there is none, NaN if it is not estimated."""
         return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
 
 

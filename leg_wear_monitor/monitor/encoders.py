@@ -447,7 +447,7 @@ class EncoderWatch(Observer):
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
-        """Encoders that give nothing that can be used."""
+        """Encoders without usable angles."""
         return {"ENCODER": faults(self._leg.config.encoders.names, self.state)}
 
     @property
@@ -486,7 +486,7 @@ class EncoderWatch(Observer):
         states = {one.observation for _, one in each}
         waiting = states & {ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING}
         if not words and not waiting and ClearanceObservation.SEEN in states:
-            words = ["clearances agree with the modelled ones"]
+            words = ["clearances agree with the model"]
         hidden = ClearanceObservation.NOT_OBSERVABLE
         words += [f"{joint} {hidden.value}" for joint, one in each if one.observation is hidden]
         return words + sorted(one.value for one in waiting)

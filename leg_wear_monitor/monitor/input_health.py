@@ -640,7 +640,7 @@ def _phase_means(profile: TorqueProfile) -> tuple[Floats, Floats] | None:
 
 
 def _correlation(one: Floats, other: Floats) -> float:
-    """Correlation of two torques (n,) without their means; 0 for one that does not vary."""
+    """Correlation of two torques (n,) without their means; 0 if one of them is constant."""
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float(one @ other) / size if size > 0.0 else 0.0
 

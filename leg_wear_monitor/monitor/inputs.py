@@ -298,7 +298,7 @@ class InputGuard:
 
     @property
     def sources(self) -> int:
-        """Present number of series of crank angles: 2 if two different ones interleave."""
+        """Present number of series of crank angles: 2 if two different series interleave."""
         return 1 + int(self._state.two)
 
     @property

@@ -90,7 +90,7 @@ def torque_status(
 
 
 def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
-    """Clearances by the drive torque; NaN for joints that are not observable."""
+    """Clearances from the drive torque; NaN for joints that are not observable."""
     values = {"cycles": float(diagnosis.cycles)}
     for reason in NotUsed:
         values[f"not_used_{reason.value}"] = float(diagnosis.cycles_not_used.get(reason.value, 0))

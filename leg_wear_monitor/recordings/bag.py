@@ -345,7 +345,7 @@ def assign(
                 source.select(stream, topic)
             continue
         text = f"is not a topic of the recording; it has {listed(recorded)}"
-        if set(recorded) - set(topics.values()):  # an unused topic may be it, renamed
+        if set(recorded) - set(topics.values()):  # an unused topic may be the renamed input
             text += f"; select one with {_option(stream)}"
         if stream.is_needed:
             raise RecordingError(str(first), stream.topic, text)

@@ -213,5 +213,5 @@ class ForecastTimes:
                 yield cycle
 
     def _is_minute(self, stamp_ns: int) -> bool:
-        """True if no forecast was published yet, or the last is a minute old or has a different time base."""
+        """True if the last forecast is a minute old, is missing, or has a different time base."""
         return self._published_ns is None or not 0 <= stamp_ns - self._published_ns < _MINUTE_NS

@@ -350,7 +350,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
 
 
 def _of_known(statistic: Callable[[Floats], Any], values: Floats) -> float | None:
-    """A statistic of the values that are known: forces of gait cycles that were tracked."""
+    """A statistic of the known values, such as forces of tracked gait cycles."""
     known = values[np.isfinite(values)]
     return float(statistic(known)) if len(known) else None
 

@@ -119,7 +119,7 @@ TRACKER_MODEL = np.dtype(
         ("node_interval_ns", "i8"),  # least time between spline nodes
         ("stop_speed", "f8"),  # least speed of a moving crank [rad/s]
         ("slowest", "f8"),  # least speed of a gait in step [rad/s]
-        ("fastest", "f8"),  # largest speed of a gait in step [rad/s]
+        ("fastest", "f8"),  # largest speed of a gait within the tolerance [rad/s]
         ("commanded_speed", "f8"),  # crank speed of the gait [rad/s]
         ("largest_speed", "f8"),  # largest plausible speed [rad/s]
     ]

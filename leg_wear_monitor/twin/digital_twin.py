@@ -398,7 +398,7 @@ class DigitalTwin:
         return Event(stamp, TwinEventKind.ACQUIRED)
 
     def _run_in(self, angle: float, speed: float) -> int:
-        """Run the leg in up to a crank angle [rad] and speed [rad/s], without wear.
+        """Let the leg run in, up to a crank angle [rad] and speed [rad/s], without wear.
 
         Journals start centred, and their first impacts can be several times as large as in the gait: they
         must not be reported.

@@ -61,7 +61,7 @@ from leg_wear_monitor.workers import compiled_beside
 INTERVALS = 2048  # intervals per turn at the setup's speed
 # Used if only statistics and wear are needed, and the drive is rigid; the errors are in physics.md section 7.
 STATISTICS_INTERVALS = 1024
-_MOST_PARTS = 8  # parts of an interval of the usual length: bounds its cost
+_MOST_PARTS = 8  # largest number of parts of an interval, which bounds its cost
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller error does not change means
 TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
 

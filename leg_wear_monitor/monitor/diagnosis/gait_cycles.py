@@ -23,9 +23,9 @@ from leg_wear_monitor.twin.reference import CrankProfile, cycle_profile
 from leg_wear_monitor.twin.sample import INSTANT, within
 
 _LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
-_LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
+_LEAST_CRANK_SAMPLES = 40  # least number of samples in a gait cycle for its profile
 
-# fraction of the sensor's period: if times are more irregular, steps between samples do not show the
+# largest jitter as a fraction of the sensor's period; beyond it, steps between samples do not show the
 # roughness
 _JITTER = 0.15
 

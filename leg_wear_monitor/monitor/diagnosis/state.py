@@ -75,7 +75,7 @@ class DiagnosisState(Enum):
 
 
 class NotUsed(Enum):
-    """Why a gait cycle says nothing of the clearances; the value is the word that files contain."""
+    """Why a gait cycle contains no information on clearances; files contain the value."""
 
     CADENCE = "cadence"
     STANDSTILL = "standstill"

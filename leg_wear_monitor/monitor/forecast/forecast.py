@@ -535,7 +535,7 @@ class Forecaster:
         self._update_coefficients(k, self._estimate(k, replaced_ns))
 
     def corrected(self, correction: CorrectedClearance) -> None:
-        """Count the wear of a joint from a corrected clearance on."""
+        """Start the wear of a joint again from a corrected clearance."""
         self.corrections += (correction,)
         self.replaced(correction.joint, correction.replaced_ns)
 

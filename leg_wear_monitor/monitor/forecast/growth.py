@@ -141,7 +141,7 @@ class ModelError:
     Attributes
     ----------
     ideal_m : (k,) array
-        Growth a gait cycle that the ideal motion makes.
+        Growth per gait cycle from the ideal motion.
     sensitivity : (k,) array
         Sensitivity of its logarithm to the logarithms of all masses, root sum of squares; the person's mass
         is known less well.

@@ -219,7 +219,7 @@ class CoefficientEstimate:
         return float(np.interp(0.5, reached, expected[order]))
 
     def probability_below(self, observation: ClearanceAtWear) -> float:
-        """Predicted probability that a measurement of this accuracy, now, is smaller than this one."""
+        """Predicted probability of a smaller measurement with this accuracy at this time."""
         worn = observation.wear_m - self.known.wear_m
         expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
         spread = math.hypot(observation.sigma_m, self.excess_sigma_m)

@@ -271,7 +271,7 @@ def commissioned_torques(stored: Iterable[CommissionedTorque]) -> list[Commissio
     """
     found: list[CommissionedTorque] = []
     for one in reversed(tuple(stored)):
-        # the deviations of unknown clearances grow with them; a different correction has different ones
+        # the deviations of unknown clearances grow with the corrections, which differ from case to case
         if found and not np.allclose(one.sigma_m, found[0].sigma_m, rtol=0.1, atol=0.0):
             break
         if not any(_is_alike(one.speed, other.speed) for other in found):

@@ -270,7 +270,7 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
     height = max(scale * (max(ys) - min(ys)) + 2.0 * _MARGIN, 160.0)
 
     def at(place: Place) -> Place:
-        """From the leg's plane [m], y up, to the drawing's, y down."""
+        """Convert from the plane of the leg [m], y upwards, to the drawing, y downwards."""
         x, y = _MARGIN + scale * (place[0] - min(xs)), _MARGIN + scale * (max(ys) - place[1])
         return round(x, 1), round(y, 1)
 

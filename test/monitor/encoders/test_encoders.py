@@ -106,7 +106,7 @@ def test_encoders_are_commissioned_and_show_what_is_there(commissioned, read):
         assert one.clearance_m == pytest.approx(3.0e-4, abs=8e-6)
         assert one.believed
         assert not one.is_other
-    assert status_of(monitor, "encoders").message == "clearances agree with the modelled ones"
+    assert status_of(monitor, "encoders").message == "clearances agree with the model"
     assert reports.cycles[-1].joints[0].forecast.measurements == 1
 
 

@@ -4,9 +4,10 @@ The monitor makes it, and every display of a leg is a view of it. SI units; None
 """
 
 import re
+from collections.abc import Mapping
 from enum import Enum, IntEnum
 from html import escape
-from typing import Any
+from typing import Any, Self
 
 import attrs
 
@@ -132,6 +133,13 @@ class Verdict:
         """State, joints, reason and action in one line."""
         whose = f" joint {', '.join(self.joints)}" if self.joints else ""
         return as_plain(f"{self.state.words}{whose}: {self.why}. To do: {self.do}")
+
+    def with_files(self, files: Mapping[str, object]) -> Self:
+        """The same verdict, whose commands name files in place of ``FILE``, by option; None is not known."""
+        do = self.do
+        for option, path in files.items():
+            do = do.replace(f"{option} FILE", f"{option} {path}") if path is not None else do
+        return attrs.evolve(self, do=do)
 
     def _repr_html_(self) -> str:
         """HTML for a notebook, without scripts."""

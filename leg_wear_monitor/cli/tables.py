@@ -139,14 +139,11 @@ def print_state(
     console: Console, state: "LegState", joint_words: Callable[[str], str], files: Mapping[str, Path | None]
 ) -> None:
     """Print the verdict, a row per joint and the raised alarms; commands name the files that are known."""
-    verdict = state.verdict
+    verdict = state.verdict.with_files(files)
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     head = f"{verdict.state.words.upper()}{whose}"
     console.print(f"\n[bold]{head}[/bold]: {as_plain(verdict.why)}", soft_wrap=True)
-    to_do = verdict.do
-    for option, path in files.items():
-        to_do = to_do.replace(f"{option} FILE", f"{option} {path}") if path else to_do
-    rows = [("to do", to_do), *decision_of(state)]
+    rows = [("to do", verdict.do), *decision_of(state)]
     rows.append(("code", f"{verdict.fault_code}, see {share_directory() / guide_to(verdict)}"))
     if verdict.not_valid:
         rows.append(("not valid", ", ".join(figure.words for figure in verdict.not_valid)))

@@ -137,7 +137,7 @@ def update_leg(leg: FleetLeg, out: Path) -> LegUpdate:
             remove_parts(directory, "*")
             for path in in_order(_new_recordings(leg, directory), leg):
                 new.append(_count(leg, directory, path))
-            state = leg_state(leg, directory)
+            state = _with_files(leg_state(leg, directory), leg, directory)
     except LegWearError as error:
         fault = printable(str(error))
     lines = read_lines(directory)
@@ -288,6 +288,15 @@ def leg_state(leg: FleetLeg, directory: Path) -> LegState | None:
     return with_same_fields(
         LegState, summary, verdict=now.verdict, clearances=now.clearances, alarms=now.alarms
     )
+
+
+def _with_files(state: LegState | None, leg: FleetLeg, directory: Path) -> LegState | None:
+    """The state, whose commands name the files of the leg as seen from the directory of the description."""
+    if state is None:
+        return None
+    config = leg.shown(leg.config_file) if leg.config_file else None
+    files = {"--config": config, "--ledger": leg.shown(directory / LEDGER)}
+    return attrs.evolve(state, verdict=state.verdict.with_files(files))
 
 
 def _summary(path: Path) -> ReplaySummary | None:

@@ -108,6 +108,7 @@ def test_the_table_and_the_page_have_each_leg(fleet, run) -> None:
     worst = table.iloc[0]
     assert (worst.worst_joint, worst.fault_code) == ("G", "CLEARANCE_DETECTED_G")
     assert worst.clearance_m > worst.limit_m
+    assert "--ledger out/legs/knocking/ledger" in worst.do  # as seen from the directory of the description
     lines = (fleet[1] / "fleet.csv").read_text().splitlines()
     assert [line.split(",")[0] for line in lines] == ["leg", *WORST_FIRST]
     recordings = lw.Fleet(fleet[1]).recordings()

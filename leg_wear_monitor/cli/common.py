@@ -97,12 +97,12 @@ mechanism_option: Option = option(
     "--mechanism", "FILE", "A mechanism file, or the name of one of the package.", default="bionic_leg"
 )
 clearances_option: Option = option(
-    "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: as in the file]"
+    "--clearances", "A,B", "Clearance joints, such as A,B; or none.  [default: as in the mechanism file]"
 )
 speed_option: Option = option(
     "--speed-rpm",
     "RPM",
-    "Crank speed [rpm], negative for clockwise.  [default: as in the file]",
+    "Crank speed [rpm], negative for clockwise.  [default: as in the mechanism file]",
     type=float,
 )
 limit_option: Option = positive(

@@ -233,7 +233,7 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
         (("A", "--withdraw", "--accept"), "cannot be combined with MM, --sigma or --accept"),
         (("knee", "--withdraw"), "no measurement of joint G can be withdrawn"),
         (("neck", "--withdraw"), "'neck' is not a clearance joint"),
-        (("A", "0.4"), "expected JOINT MM --sigma MM, or JOINT --withdraw"),
+        (("A", "0.4"), "MM needs --sigma. Expected JOINT MM --sigma MM, or JOINT --withdraw"),
         ((), "Missing argument 'JOINT'"),
         (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
     ],

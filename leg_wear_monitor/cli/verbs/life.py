@@ -35,7 +35,7 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
     "N:H,...",
     "Hours per day at each peak of the ground's vertical force on the "
     "toe, as N:hours, such as 0:2,300:5,600:1.  "
-    "[default: as in the file]",
+    "[default: as in the mechanism file]",
 )
 @common.positive("--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump [m].  [default: 3e-05]")
 @common.count("--legs", "N", "Number of legs averaged.  [default: 2]")

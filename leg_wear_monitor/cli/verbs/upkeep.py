@@ -220,7 +220,7 @@ def measure(
         click.echo(line)
         return 0
     if mm is None or sigma is None:
-        raise click.UsageError("expected JOINT MM --sigma MM, or JOINT --withdraw")
+        raise click.UsageError("MM needs --sigma. Expected JOINT MM --sigma MM, or JOINT --withdraw")
     size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
     if live is not None:
         common.need_rclpy()

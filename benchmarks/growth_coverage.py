@@ -3,7 +3,7 @@
 Each leg has its own masses and joints, and a crank with a ripple. Its truth is the mean growth of many gait
 cycles in full coordinates. The monitor's twin is the leg on paper, in clearance coordinates, and has noisy
 crank angles only, or the drive torque as well (`--torque`). The benchmark also prints the factor in
-`model_error.py` for the growth from impacts: it comes from the first sixteen legs with `--quick`, so other
+`growth.py` for the growth from impacts: it comes from the first sixteen legs with `--quick`, so other
 legs show the coverage.
 `python benchmarks/growth_coverage.py --first 16 --keep DIRECTORY` takes about half an hour of one core, and
 some more minutes for other windows. With `--quick` the truth is a twin of the leg as built instead: not

@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.config.inputs import EFFORT
 from leg_wear_monitor.monitor.config.parameters import config_from, load_config, values_of
 from leg_wear_monitor.monitor.config.settings import LedgerFile, MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.reference_file import simulated_under
-from leg_wear_monitor.monitor.input_health import INPUT_RULES
+from leg_wear_monitor.monitor.input_health import INPUT_FAULTS
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
@@ -254,15 +254,15 @@ def _walk(
     mechanism = load_mechanism(config.mechanism)
     monitor = WearMonitor(mechanism, config)
     crank: Samples = np.zeros(0, GAIT_SAMPLE)
-    codes, faults = {rule.code for rule in INPUT_RULES}, dict[str, str]()
+    faults = dict[str, str]()
     mismatch: list[float] = []
     profiles: list[CrankProfile] = []
     with Recording(recordings, config, joint_states=joint_states, drive_torque=drive_torque) as recording:
         for block in recording.blocks():
             crank = newest(np.concatenate([crank, of_crank(block.samples)]), 0)
             reports = monitor.update(block.samples)
-            reported = (each.verdict for each in reports.verdicts)
-            faults |= {one.fault_code: f"{one.why}: {one.do}" for one in reported if one.fault_code in codes}
+            reported = (each.verdict for each in reports.verdicts if each.verdict.fault_code in INPUT_FAULTS)
+            faults |= {one.fault_code: f"{one.why}: {one.do}" for one in reported}
             for cycle in reports.cycles:
                 if config.cadence.allows(cycle.cadence_rpm) and not cycle.bridged_s:
                     mismatch.append(cycle.torque_mismatch)

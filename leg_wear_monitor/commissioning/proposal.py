@@ -24,7 +24,6 @@ from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
 
@@ -368,7 +367,7 @@ def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
     if friction < -_SURE * sigma and abs(friction) > _DRIVES * float(one.predicted.std() / abs(one.gain)):
         size = f"{-friction:.2g} ± {sigma:.1g} N m"
         yield f"a constant torque of {size} drives the crank: zero the torque sensor"
-    late, most = timing.late_s, largest_lag_s(found.base)
+    late, most = timing.late_s, found.base.drive.largest_lag_s
     if abs(late) - _SURE * timing.error_s > most:
         yield (
             f"the torque is late by {1.0e3 * late:.3g} ms, more than the accepted {1.0e3 * MAX_LAG_S:g} ms "

@@ -14,7 +14,6 @@ from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
-from leg_wear_monitor.monitor.input_health import Pauses
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -22,7 +21,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ClearancePoint,
     Entry,
     Event,
-    ForecastPoint,
     JointWear,
     WalkedLoad,
     clearance_limit_key,
@@ -129,7 +127,10 @@ class Accounting:
         self._point_due_s = self._before.get(_DUE_KEY, 0.0)  # next history point, in moving_s over all runs
         self.skipped, self.skipped_s, self._skipped_ns = 0, 0.0, 0
         self._shown: Mapping[str, tuple[Level, bool]] = {}  # last state of each alarm in the history
-        self._pauses = Pauses()
+        # pauses between recordings: their number, their time, and the part of it before the last one that the
+        # unmonitored time of the twin includes
+        self._pauses, self._paused_s, self._passed_before_s = 0, 0.0, 0.0
+        self._pause_s, self._pause_at_s = 0.0, 0.0  # the last one, and the unmonitored time when it began
         self.without_zero_s = 0.0
         self.commissioned: dict[str, float] = {}
         self._loads: tuple[WalkedLoad, ...] = ()
@@ -180,13 +181,12 @@ class Accounting:
 
         It excludes time that earlier runs have modelled, and pauses between recordings.
         """
-        unmonitored_s = self._twin.intake.unmonitored_s
-        others_s = self.skipped_s + self._pauses.passed_s(unmonitored_s)
-        return max(0.0, unmonitored_s - others_s) + self.without_zero_s
+        others_s = self.skipped_s + self._passed_pauses_s
+        return max(0.0, self._twin.intake.unmonitored_s - others_s) + self.without_zero_s
 
     def lost(self, guard: InputGuard) -> Lost:
         """Samples and time that were not integrated so far, with those that a guard has withheld."""
-        intake, pauses = self._twin.intake, self._pauses
+        intake = self._twin.intake
         return with_same_fields(
             Lost,
             intake,
@@ -194,13 +194,21 @@ class Accounting:
             unmonitored_s=self.unmonitored_s,
             already_counted=self.skipped,
             outliers=intake.outliers + intake.load_outliers,
-            gaps_lost=max(0, intake.lost - pauses.number),
-            paused_s=pauses.total_s,
+            gaps_lost=max(0, intake.lost - self._pauses),
+            paused_s=self._paused_s,
         )
 
     def pause(self, pause_s: float) -> None:
         """Recording pauses for a time [s], from the newest sample on."""
-        self._pauses = self._pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
+        self._passed_before_s = self._passed_pauses_s
+        self._pauses, self._paused_s = self._pauses + 1, self._paused_s + pause_s
+        self._pause_s, self._pause_at_s = pause_s, self._twin.intake.unmonitored_s
+
+    @property
+    def _passed_pauses_s(self) -> float:
+        """Part of the pauses that the twin's unmonitored time includes, once the leg is tracked again."""
+        since_s = max(0.0, self._twin.intake.unmonitored_s - self._pause_at_s)
+        return self._passed_before_s + min(self._pause_s, since_s)
 
     @property
     def replaced_ns(self) -> list[int]:
@@ -344,9 +352,6 @@ class Accounting:
             return
         self._point_due_s = next_point_s(moving_s)
         for joint in report.joints:
-            if joint.forecast and joint.forecast.cycles:
-                quantiles = attrs.astuple(joint.forecast.cycles)
-                self.note(ForecastPoint(report.stamp_ns, report.cycle, joint.joint, *quantiles))
             self.note(
                 ClearancePoint(
                     report.stamp_ns, report.cycle, joint.joint, joint.clearance_m, joint.clearance_max_m

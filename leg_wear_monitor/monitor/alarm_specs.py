@@ -39,22 +39,6 @@ if TYPE_CHECKING:
 DEADBAND = 0.05  # fraction of a limit: a value near its limit must not switch the level in each gait cycle
 
 
-@attrs.frozen
-class LimitSource:
-    """Inputs of the limits: parameters, RMS of the predicted torque, largest lag, and the clearance joint."""
-
-    config: "MonitorConfig"
-    torque_size_nm: float
-    max_lag_s: float
-    joint: int = 0
-
-    @property
-    def clearance_m(self) -> float:
-        """The joint's own limit if there are limits per joint, otherwise the common one."""
-        limits = self.config.limits
-        return limits.joint_clearance_m[self.joint] if limits.joint_clearance_m else limits.clearance_m
-
-
 @attrs.frozen(kw_only=True)
 class AlarmSpec:
     """An alarm.
@@ -68,12 +52,12 @@ class AlarmSpec:
     quantity : str
         Noun of the value, for sentences.
     meaning, limit_words : str
-        For operators: meaning of the value, and the parameters of its limit.
+        For operators: meaning of the value, by default its noun and unit, and the parameters of its limit.
     value : callable
         Value from the evidence: a joint's report, the input's health or its guard; from the values of a gait
         cycle or of its foot load, which are given by kind, the value of this kind.
     limit : callable
-        Limit of ERROR.
+        Limit of ERROR, from the parameters, the RMS of the predicted torque and the number of the joint.
     is_immediate : bool
         True if the level rises in the first gait cycle beyond, without `alarms.on_delay_cycles`.
     is_least : bool
@@ -92,16 +76,20 @@ class AlarmSpec:
     subject: str = ""
     unit: str = ""
     quantity: str
-    meaning: str
+    meaning: str = attrs.field()
     limit_words: str
     value: Callable[[Any], float] = attrs.field()
-    limit: Callable[[LimitSource], float]
+    limit: Callable[["MonitorConfig", float, int], float]
     is_immediate: bool = False
     is_least: bool = False
     is_count: bool = False
     is_latched: bool = True
     far: float = math.inf
     figure: Figure | None = None
+
+    @meaning.default
+    def _by_quantity(self) -> str:
+        return f"{self.quantity}, {self.unit}" if self.unit else self.quantity
 
     @value.default
     def _by_kind(self) -> Callable[[Any], float]:
@@ -115,35 +103,34 @@ class AlarmSpec:
         """Name of the alarm, such as ``clearance A``."""
         return f"{self.kind} {self.subject or joint}".rstrip()
 
-    def limits(self, source: LimitSource) -> Limit:
+    def limits(self, config: "MonitorConfig", torque_size_nm: float, joint: int) -> Limit:
         """Limits of its levels."""
-        error = self.limit(source)
+        error = self.limit(config, torque_size_nm, joint)
         if self.is_count:
             return Limit(error, error)
         first = error / WARN_FRACTION if self.is_least else WARN_FRACTION * error
-        delay = 1 if self.is_immediate else source.config.alarms.on_delay_cycles
+        delay = 1 if self.is_immediate else config.alarms.on_delay_cycles
         return Limit(first, error, DEADBAND, delay, self.is_least, self.is_latched, self.far)
 
 
 def _parameter(name: str) -> dict[str, Any]:
     """Limit of an alarm that is a parameter of the section ``limits``."""
-    return {"limit_words": f"`limits.{name}`", "limit": lambda of: getattr(of.config.limits, name)}
+    return {"limit_words": f"`limits.{name}`", "limit": lambda config, *_: getattr(config.limits, name)}
 
 
 def _constant(limit: float, words: str = "") -> dict[str, Any]:
     """Limit of an alarm that is the same for all legs."""
-    return {"limit_words": words or f"{limit:g}", "limit": lambda _: limit}
+    return {"limit_words": words or f"{limit:g}", "limit": lambda *_: limit}
 
 
 IMPACT = AlarmSpec(
     kind="impact_force",
     unit="N",
     quantity="peak contact force",
-    meaning="peak contact force of the gait cycle, N",
     limit_words="`limits.impact_force_n`; from 1.1 times the commanded cadence on, times the square of the "
     "ratio",
     value=lambda joint: joint.peak_force_n,
-    limit=lambda of: of.config.limits.impact_force_n,
+    limit=lambda config, *_: config.limits.impact_force_n,
     is_immediate=True,  # the next impact may break the joint
     figure=Figure.IMPACT_FORCES,
 )
@@ -154,14 +141,13 @@ CLEARANCE = AlarmSpec(
     meaning="mean radial clearance, modelled or, if larger, measured, m",
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
     value=lambda joint: joint.judged_clearance_m,
-    limit=lambda of: of.clearance_m,
+    limit=lambda config, _, joint: config.limits.of_joint_m(joint),
     figure=Figure.CLEARANCES,
 )
 GROWTH = AlarmSpec(
     kind="growth",
     unit="m/h",
     quantity="growth of the mean radial clearance",
-    meaning="growth of the mean radial clearance, m/h",
     **_parameter("growth_m_per_hour"),
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
     figure=Figure.GROWTH,
@@ -170,7 +156,6 @@ LIFE = AlarmSpec(
     kind="remaining_life",
     unit="h",
     quantity="p10 of the remaining life",
-    meaning="p10 of the remaining life, h",
     **_parameter("remaining_life_h"),
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
     is_least=True,
@@ -207,14 +192,12 @@ CADENCE = AlarmSpec(
     kind="cadence",
     unit="rpm",
     quantity="departure from the commanded cadence",
-    meaning="departure from the commanded cadence, rpm",
     limit_words="`cadence.tolerance_rpm`",
-    limit=lambda of: of.config.cadence.tolerance_rpm,
+    limit=lambda config, *_: config.cadence.tolerance_rpm,
 )
 SOURCES = AlarmSpec(
     kind="input_sources",
     quantity="number of sources of the crank angle",
-    meaning="number of sources of the crank angle",
     **_constant(2.0, "2, at once"),
     value=lambda guard: float(guard.sources),
     is_count=True,
@@ -231,23 +214,21 @@ TORQUE = (
         meaning="constant drive torque that friction cannot cause, N m: it drives, or exceeds 0.3 of the "
         "predicted RMS",
         limit_words="0.1 of the predicted RMS",
-        limit=lambda of: 0.1 * of.torque_size_nm,
+        limit=lambda _, torque_size_nm, *__: 0.1 * torque_size_nm,
     ),
     AlarmSpec(
         kind=DRIFT,
         unit="N m",
         quantity="change of the constant drive torque since commissioning",
-        meaning="change of the constant drive torque since this leg was commissioned, N m",
         limit_words="0.15 of the predicted RMS",
-        limit=lambda of: 0.15 * of.torque_size_nm,
+        limit=lambda _, torque_size_nm, *__: 0.15 * torque_size_nm,
     ),
     AlarmSpec(
         kind=LAG,
         unit="s",
         quantity="delay of the measured torque",
-        meaning="delay of the measured torque, late or early, s",
         limit_words="5 ms, and the declared lag and low-pass of the drive",
-        limit=lambda of: of.max_lag_s,
+        limit=lambda config, *_: config.drive.largest_lag_s,
     ),
 )
 GAIT = (CADENCE,)
@@ -260,21 +241,20 @@ def _rate(name: str) -> AlarmSpec:
         subject=name,
         unit="Hz",
         quantity=f"rate of usable {name} samples",
-        meaning=f"rate of usable {name} samples, Hz",
         **_constant(40.0, "40 Hz"),  # five samples per period of the tracker's bandwidth of 8 Hz
-        value=lambda health: health.rate_hz[name],
+        value=lambda health: health[f"{name}_rate_hz"],
         is_least=True,
         is_latched=False,
     )
 
 
-def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any:
+def _foot_load(kind: str, quantity: str, subject: str = "") -> AlarmSpec:
     """A fault of the sensor of the foot load, in a gait cycle."""
     return AlarmSpec(
         kind=kind,
         subject=subject,
         quantity=quantity,
-        meaning=f"{meaning}. Only with `foot_load.source`",
+        meaning=f"{quantity}. Only with `foot_load.source`",
         **_constant(FOOT_LOAD_LIMITS[kind]),
         is_latched=not subject,
     )
@@ -282,40 +262,17 @@ def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any
 
 FOOT_LOAD_RATE = _rate(SAMPLE_KINDS[LOAD].name)
 FOOT_LOAD = (
+    _foot_load(GAPS, "fraction of time in gaps of more than 50 ms in the foot load", SAMPLE_KINDS[LOAD].name),
+    _foot_load(STUCK, "constant fraction of the largest foot load"),
+    _foot_load(ZERO, "median of the vertical foot load in swing, over its peak"),
+    # a force beyond the valid range counts as well
     _foot_load(
-        GAPS,
-        "fraction of time without samples of the foot load",
-        "fraction of a gait cycle in gaps of more than 50 ms between samples of the foot load",
-        SAMPLE_KINDS[LOAD].name,
+        SCALE, "factor between the foot load and its estimate by the torque, or a step of 10 to 5000 N"
     ),
     _foot_load(
-        STUCK,
-        "constant fraction of the foot load",
-        "fraction of the largest foot load that does not change over a gait cycle",
+        EXCHANGED, "correlation of the foot load with stance of the other foot, minus that of this foot"
     ),
-    _foot_load(
-        ZERO,
-        "foot load in swing over its peak",
-        "median of the vertical foot load in swing, over its peak",
-    ),
-    _foot_load(
-        SCALE,
-        "factor between the foot load and its estimate from the drive torque, or a usual step",
-        "factor by which the foot load differs from its estimate from the drive torque, or without a torque "
-        "from a step of 10 to 5000 N; or three times the largest force over 50 kN",
-    ),
-    _foot_load(
-        EXCHANGED,
-        "correlation of the foot load with the stance of the other foot, minus the same for this foot",
-        "correlation of the vertical foot load with the stance of the "
-        "other foot, minus that with the stance of "
-        "this foot",
-    ),
-    _foot_load(
-        SIGN,
-        "pull of the foot load over its largest force",
-        "largest pull of the foot load downwards, over its largest vertical force",
-    ),
+    _foot_load(SIGN, "largest pull of the foot load, over its largest force"),
 )
 
 INPUT = (
@@ -325,14 +282,13 @@ INPUT = (
         quantity="fraction of unusable samples",
         meaning="fraction of unusable samples: faulty, repeated, late, wrong stamp, outlier",
         **_constant(0.05),
-        value=lambda health: health.bad_fraction,
+        value=lambda health: health["bad_fraction"],
     ),
     AlarmSpec(
         kind="input_gaps",
         quantity="fraction of unmonitored time",
-        meaning="fraction of unmonitored time",
         **_constant(0.05),
-        value=lambda health: health.lost_fraction,
+        value=lambda health: health["lost_fraction"],
         is_latched=False,
     ),
     AlarmSpec(
@@ -340,7 +296,7 @@ INPUT = (
         quantity="fraction of stuck or saturated torque samples",
         meaning="fraction of torque samples that repeat the largest or the smallest",
         **_constant(0.3),  # a torque that is not clipped repeats its extremes in a few samples only
-        value=lambda health: health.stuck_torque_fraction,
+        value=lambda health: health["stuck_torque_fraction"],
     ),
 )
 

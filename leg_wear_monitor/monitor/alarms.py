@@ -270,40 +270,6 @@ GAPS, STUCK, ZERO, SCALE, EXCHANGED, SIGN = (
 """Kinds of the alarms of the foot load's sensor; their values have these names."""
 FOOT_LOAD_LIMITS = {GAPS: 0.05, STUCK: 0.9, ZERO: 0.1, SCALE: 3.0, EXCHANGED: 0.5, SIGN: 0.5}
 
-FOOT_LOAD_WORDS = {
-    STUCK: "the foot load does not change between stance and swing: its sensor is stuck, or the leg walks in "
-    "the air",
-    ZERO: "the foot load is not 0 in swing: the zero of its sensor has drifted",
-    SCALE: "the foot load does not agree with the drive torque or with a step of a leg: its unit or "
-    "scale is wrong",
-    EXCHANGED: "the foot load is present while this foot is in the air: it belongs to the other leg",
-    SIGN: "the foot load pulls: its sign is reversed",
-}
-"""Fault code by the kind of the alarm."""
-
-FAULT_CODES = {
-    NO_FAULT: "nothing is wrong",
-    INPUT_SILENCE: "no usable samples arrive; each status without current data has this code",
-    TRACKING_LOST: "the monitor cannot track the crank, see `input`",
-    CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
-    ENCODERS: "a further encoder gives no usable angles",
-    DIAGNOSIS: "the drive torque indicates a change; the code of the verdict names it",
-    LEDGER_NOT_WRITTEN: "the ledger cannot be written",
-    LEDGER_INTERRUPTED: "an earlier run was interrupted",
-    SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
-    SAMPLES_NOT_PUBLISHED: "the node is overloaded: it does not publish values of samples, or publishes them "
-    "late while it records",
-    TOPICS: "an input topic has no publisher or several, a wrong type, no crank, a torque about a wrong "
-    "axis, or lost messages",
-    RECORDING_STOPPED: "the recording of the node has stopped",
-    CLOCK_MISSING: "`use_sim_time` is set, and no node publishes `/clock`",
-    CLOCK_STOPPED: "`/clock` has stopped",
-    CLOCK_SET_BACK: "the clock was set back",
-    STAMPS_AHEAD: "the stamps of an input are ahead of the clock of the node",
-    ALREADY_COUNTED: "the monitor skips samples whose time is in the ledger already",
-}
-"""Codes that are not the name of an alarm, and their meaning."""
-
 BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
 CAUSES_OF_ALARMS = {BIAS: Cause.BIAS, DRIFT: Cause.FRICTION, LAG: Cause.TIMING}
 """Causes that have a limit of their own, by the alarm."""

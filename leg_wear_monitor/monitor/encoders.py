@@ -27,7 +27,7 @@ from leg_wear_monitor.monitor.angle_regression import (
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.forecast.forecast import RENEWED_NS
+from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.monitor.observer import Observer

@@ -9,24 +9,20 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.compiled.kernel import Records, entry, new_records
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarm_specs import AlarmSpec, LimitSource
+from leg_wear_monitor.monitor.alarm_specs import AlarmSpec
 from leg_wear_monitor.monitor.alarms import Alarm, Limit, acknowledged, cleared, evaluated, has_changed
-from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.input_health import (
-    InputHealth,
-    TorqueRange,
     causes,
     input_health,
-    with_not_finite,
-    with_torques,
 )
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.verdict.situation import is_observed
+from leg_wear_monitor.monitor.verdict.verdict import table
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.sample import NO_LOAD, Samples
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_LOAD, Samples
 from leg_wear_monitor.twin.statistics import Intake, Tracking
 
 # All alarms of a monitor, and the limits that its parameters set for them.
@@ -55,52 +51,44 @@ def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
-    lag_s = largest_lag_s(config)
-    return {
-        alarm.name: spec.limits(LimitSource(config, torque_size_nm, lag_s, k))
-        for spec, k, alarm in specs_of(config, clearance_joints)
-    }
+    specs = specs_of(config, clearance_joints)
+    return {alarm.name: spec.limits(config, torque_size_nm, k) for spec, k, alarm in specs}
 
 
 class AlarmBoard:
-    """Present state of all alarms.
+    """Present state of some alarms.
 
     Parameters
     ----------
-    config : MonitorConfig
-    clearance_joints : tuple of str
-    torque_size_nm : float
-        RMS of the predicted drive torque.
+    alarms : iterable of Alarm
+    limits : mapping of str to Limit
+        By the names of the alarms.
 
     Attributes
     ----------
     alarms : dict of str to Alarm
         By name, always in the same order.
+    limits : mapping of str to Limit
     """
 
-    def __init__(
-        self, config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
-    ) -> None:
-        self._clearance_joints, self._torque_size_nm = clearance_joints, torque_size_nm
-        self._limits = limits_of(config, clearance_joints, torque_size_nm)
-        self.alarms = {alarm.name: alarm for _, _, alarm in specs_of(config, clearance_joints)}
+    def __init__(self, alarms: Iterable[Alarm], limits: Mapping[str, Limit]) -> None:
+        self.alarms = {alarm.name: alarm for alarm in alarms}
+        self.limits = limits
 
-    def configure(self, config: MonitorConfig) -> None:
-        """Use other limits from now on."""
-        self._limits = limits_of(config, self._clearance_joints, self._torque_size_nm)
+    @property
+    def _clearances(self) -> list[str]:
+        """Names of the alarms of clearances, in the order of the joints."""
+        return [name for name, one in self.alarms.items() if one.kind == alarm_specs.CLEARANCE.kind]
 
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:
         """Limit of each clearance joint's clearance."""
-        return tuple(
-            self._limits[alarm_specs.CLEARANCE.name(joint)].error for joint in self._clearance_joints
-        )
+        return tuple(self.limits[name].error for name in self._clearances)
 
     @property
     def observed(self) -> tuple[str, ...]:
         """Alarms of clearances that are present because of something else than counting."""
-        names = map(alarm_specs.CLEARANCE.name, self._clearance_joints)
-        return tuple(name for name in names if is_observed(self.alarms[name]))
+        return tuple(name for name in self._clearances if is_observed(self.alarms[name]))
 
     def evaluate(
         self,
@@ -131,12 +119,12 @@ class AlarmBoard:
 
     def reaches(self, name: str, value: float) -> bool:
         """True if a value reaches the limit of WARN of an alarm."""
-        return self._limits[name].reaches(value, Level.WARN)
+        return self.limits[name].reaches(value, Level.WARN)
 
     def _limit(self, name: str, impact_factor: float) -> Limit:
         """Limit of an alarm, with a factor on the limits of impact forces."""
         is_impact = impact_factor != 1.0 and self.alarms[name].kind == alarm_specs.IMPACT.kind
-        return self._limits[name].times(impact_factor) if is_impact else self._limits[name]
+        return self.limits[name].times(impact_factor) if is_impact else self.limits[name]
 
     def evaluate_early(
         self, values: Mapping[str, float], stamp_ns: int, impact_factor: float = 1.0
@@ -159,7 +147,7 @@ class AlarmBoard:
             Alarms whose values are not measured any more, in addition to alarms without a limit. They become
             normal, because no value can take them back.
         """
-        names = {*unmeasured, *(self.alarms.keys() - self._limits)}
+        names = {*unmeasured, *(self.alarms.keys() - self.limits)}
         gone = {name: attrs.evolve(self.alarms[name], present=Level.OK, beyond=(0, 0)) for name in names}
         alarms = (self.alarms | gone).values()
         now = [acknowledged(alarm) for alarm in alarms if alarm.level is not Level.OK]
@@ -181,7 +169,7 @@ class AlarmBoard:
         Alarms of an encoder or a foot load that is no longer configured stay until they are acknowledged.
         """
         for alarm in alarms:
-            is_done = alarm.acknowledged and alarm.name not in self._limits
+            is_done = alarm.acknowledged and alarm.name not in self.limits
             self.alarms[alarm.name] = cleared(alarm) if is_done else alarm
 
     def level(self, *names: str) -> Level:
@@ -286,8 +274,8 @@ class AlarmEvaluation:
 
     Attributes
     ----------
-    health : InputHealth or None
-        Health of the input at its last evaluation.
+    health : dict of str to float
+        Health of the input at its last evaluation; empty before.
     is_late : bool
         True if samples may be missing because this program was late, not the sender.
     """
@@ -303,8 +291,9 @@ class AlarmEvaluation:
         self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
-        self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
-        self.health: InputHealth | None = None
+        alarms = [alarm for _, _, alarm in specs_of(config, twin.clearance_joints)]
+        self.board = AlarmBoard(alarms, limits_of(config, twin.clearance_joints, twin.torque_size_nm))
+        self.health: dict[str, float] = {}
         self.is_late = False
         self._last_causes: tuple[str, ...] | None = None  # causes of unused samples, at the last evaluation
         self._cadence_rpm = 0.0  # cadence of the last gait cycle, 0 before the first
@@ -314,14 +303,14 @@ class AlarmEvaluation:
     def _begin(self, intake: Intake) -> None:
         """Begin to collect the data for the next evaluation of the input, from some counts on."""
         self._before, self._withheld_before = intake, self._withheld
-        self._torque = TorqueRange()
-        self._not_finite: Mapping[str, int] = {}
+        self._samples: tuple[Samples, ...] = ()
         self._periods, self._cycles = 0, 0
 
     def configure(self, config: MonitorConfig) -> None:
         """Use other limits from now on."""
         self.config = config
-        self.board.configure(config)
+        twin = self._twin
+        self.board.limits = limits_of(config, twin.clearance_joints, twin.torque_size_nm)
 
     def is_model_valid(self) -> bool:
         """True if the model is valid for the present motion: cadence and torque are as expected."""
@@ -329,8 +318,7 @@ class AlarmEvaluation:
 
     def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
-        self._torque = with_torques(self._torque, piece)
-        self._not_finite = with_not_finite(self._not_finite, piece)
+        self._samples = (*self._samples, piece)
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -344,7 +332,13 @@ class AlarmEvaluation:
 
     def _causes(self) -> tuple[str, ...]:
         withheld = self._withheld - self._withheld_before
-        return tuple(causes(self._before, self._twin.intake, withheld, self.config, self._not_finite))
+        crank, texts = self.config.crank_joint, table().samples
+        return tuple(causes(self._before, self._twin.intake, withheld, self._received, crank, texts))
+
+    @property
+    def _received(self) -> Samples:
+        """Samples since the last evaluation of the input."""
+        return np.concatenate((np.zeros(0, GAIT_SAMPLE), *self._samples))
 
     def end_cycle(
         self, report: CycleReport, observed: Mapping[str, float], is_refused: bool = False
@@ -414,10 +408,10 @@ class AlarmEvaluation:
 
     def pause(self) -> None:
         """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
-        self.health, self._last_causes = None, None
+        self.health, self._last_causes = {}, None
         self._begin(attrs.evolve(self._twin.intake, newest_stamp_ns=0))
 
-    def _of_input(self, health: InputHealth) -> dict[str, float]:
+    def _of_input(self, health: Mapping[str, float]) -> dict[str, float]:
         """Values of the input's alarms, by their names."""
         has_load = self.config.foot_load.source != NO_LOAD
         read = (*alarm_specs.INPUT, alarm_specs.FOOT_LOAD_RATE) if has_load else alarm_specs.INPUT
@@ -426,12 +420,13 @@ class AlarmEvaluation:
     def _evaluate_input(self, skipped: int, is_refused: bool) -> tuple[AlarmList, ...]:
         intake, config = self._twin.intake, self.config
         is_whole = skipped == self._skipped == self._skipped_before
-        health = input_health(self._before, intake, self._torque, is_whole)
+        received = self._received
+        health = input_health(self._before, intake, received, is_whole)
         values = self._of_input(health)
         if self.is_late:
             # missing samples may be lost by this program; if none are missing, it says the same as a replay.
             # A rate of 0 belongs to a kind that is not sent
-            unknown = input_health(self._before, intake, self._torque, is_whole=False)
+            unknown = input_health(self._before, intake, received, is_whole=False)
             without = self._of_input(unknown)
             over_time = {name: value for name, value in values.items() if math.isnan(without[name])}
             if any(value and self.board.reaches(name, value) for name, value in over_time.items()):
@@ -442,5 +437,6 @@ class AlarmEvaluation:
         self.health, self._last_causes = health, self._causes()
         self._skipped, self._skipped_before = skipped, self._skipped
         self._begin(intake)
-        cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
+        cycle_ns = self._cycle_ns if math.isnan(health["duration_s"]) else 1.0e9 * health["duration_s"]
+        cycles = round(cycle_ns / self._cycle_ns)
         return self.board.evaluate(values, intake.newest_stamp_ns, max(1, cycles))

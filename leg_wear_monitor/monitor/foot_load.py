@@ -19,18 +19,20 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.alarms import (
     EXCHANGED,
     FOOT_LOAD_LIMITS,
-    FOOT_LOAD_WORDS,
     GAPS,
     SCALE,
     SIGN,
     STUCK,
     ZERO,
+    code_of,
     worst_code,
 )
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
+from leg_wear_monitor.monitor.input_health import correlation
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.verdict.situation import ACTS
+from leg_wear_monitor.monitor.verdict.verdict import rules
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import FootLoad, Level
 from leg_wear_monitor.twin import KINDS, LOAD
@@ -50,20 +52,6 @@ _SWING_MARGIN = 0.08  # turns from the template's stance at which the foot is su
 # deviations from which a load in the torque counts, and error of the torque by other masses and clearances,
 # as a fraction of it.
 _INDEPENDENT_PHASES, _SURE_SIGMAS, _MODEL_FRACTION = 16.0, 5.0, 0.1
-
-
-@attrs.frozen(eq=False)
-class _Cycle:
-    """A gait cycle with samples of the load: by phase, force (2, n) [N], unexplained torque (n,) [N m].
-
-    ``acted`` is 1 if the twin walked under this load, so that its predicted torque contains it, and 0
-    otherwise.
-    """
-
-    load: LoadProfile
-    force_n: Floats
-    unexplained_nm: Floats
-    acted: float
 
 
 class FootLoadCheck(Observer):
@@ -104,8 +92,12 @@ class FootLoadCheck(Observer):
             [stance.heel_strike, stance.toe_off]
         )
         self._load_acts = float(config.load.model == MEASURED)
-        self._cycles: tuple[_Cycle, ...] = ()
-        self._acted = 0.0  # `_Cycle.acted` of the present gait cycle; at first no mean is known
+        # last gait cycles with samples of the load: force (2, n), unexplained torque (n,) by phase, and 1 if
+        # the twin walked under this load, so that its predicted torque contains it
+        self._forces_n: tuple[Floats, ...] = ()
+        self._unexplained_nm: tuple[Floats, ...] = ()
+        self._have_acted: tuple[float, ...] = ()
+        self._acted = 0.0  # the same for the present gait cycle; at first no mean is known
         self._largest_n = 0.0  # largest force received since the last gait cycle, unusable values included
         self._is_missing = False  # True if the last gait cycle had no sample
         self._is_frozen = False  # whether the samples do not act
@@ -139,9 +131,13 @@ class FootLoadCheck(Observer):
         self._largest_n, self._is_missing = 0.0, load is None
         if load is None:
             return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
-        force = means_by_phase(load.number, load.force_n)
-        cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), self._acted)
-        self._cycles = (*self._cycles, cycle)[-_CYCLES:]
+        force_n, unexplained_nm = (
+            means_by_phase(load.number, load.force_n),
+            _unexplained(statistics.torque_profile),
+        )
+        self._forces_n = (*self._forces_n, force_n)[-_CYCLES:]
+        self._unexplained_nm = (*self._unexplained_nm, unexplained_nm)[-_CYCLES:]
+        self._have_acted = (*self._have_acted, self._acted)[-_CYCLES:]
         stuck = _stuck_fraction(load)
         self._is_noise = stuck < FOOT_LOAD_LIMITS[STUCK] and self._is_only_noise()
         stuck = 1.0 if self._is_noise else stuck
@@ -177,12 +173,11 @@ class FootLoadCheck(Observer):
     @property
     def load(self) -> FootLoad:
         """The load over the last gait cycles."""
-        cycles = self._cycles
-        if not cycles:
+        up = self._up_n
+        if not len(up):
             return FootLoad()
-        up = np.array([self._stance.up @ each.force_n for each in cycles])
         mean = up.mean(axis=0)
-        found, several = self._stance_phases(mean), len(cycles) > 1
+        found, several = self._stance_phases(mean), len(up) > 1
         spread = (np.array([self._stance_phases(each) for each in up]) - found + 0.5) % 1.0 - 0.5
         sigma = spread.std(axis=0, ddof=1).tolist() if several else [None, None]
         heel_strike, toe_off = ((found - self._phase_bias) % 1.0).tolist()
@@ -196,14 +191,18 @@ class FootLoadCheck(Observer):
             toe_off_phase=toe_off,
             heel_strike_sigma=sigma[0],
             toe_off_sigma=sigma[1],
-            cycles=len(cycles),
+            cycles=len(up),
         )
 
     @property
     def mean_force_n(self) -> Floats | None:
         """Mean force (FINE_PHASES, 2) by phase along the axes of the mechanism [N]; None before the first."""
-        cycles = self._cycles
-        return np.mean([each.force_n for each in cycles], axis=0).T if cycles else None
+        return np.mean(self._forces_n, axis=0).T if self._forces_n else None
+
+    @property
+    def _up_n(self) -> Floats:
+        """Vertical force (cycles, n) by phase [N]."""
+        return np.array([self._stance.up @ force_n for force_n in self._forces_n])
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
@@ -213,7 +212,7 @@ class FootLoadCheck(Observer):
     @property
     def leg_fields(self) -> Mapping[str, Any]:
         """The measured load."""
-        return {"load": self.load} if self._cycles else {}
+        return {"load": self.load} if self._forces_n else {}
 
     @property
     def statuses(self) -> Sequence[Status]:
@@ -225,7 +224,10 @@ class FootLoadCheck(Observer):
         fields = attrs.asdict(load).items()
         values = {name: or_nan(value) for name, value in fields if not isinstance(value, str)}
         values["outliers"] = float(outliers)
-        messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
+        rows = [rules().get(code_of(alarm)) for alarm in raised]
+        messages = [
+            row.fault if row else f"see: {alarm.name}" for row, alarm in zip(rows, raised, strict=True)
+        ]
         if messages:
             messages.append(self.acts)
         else:
@@ -246,14 +248,14 @@ class FootLoadCheck(Observer):
 
     def _comparisons(self) -> dict[str, float]:
         """Values of the alarms that compare the load with stance and with the drive torque or usual steps."""
-        cycles = self._cycles
-        force = np.mean([each.force_n for each in cycles], axis=0)
+        force = np.mean(self._forces_n, axis=0)
         up = self._stance.up @ force
         largest = float(np.abs(up).max())
-        if len(cycles) < _LEAST_CYCLES or not self._is_above_noise(up):
+        if len(self._forces_n) < _LEAST_CYCLES or not self._is_above_noise(up):
             return {}
         sign = -1.0 if -up.min() > up.max() else 1.0
-        fits = [_correlation(sign * up, np.roll(self._expected, k)) for k in (0, FINE_PHASES // 2)]
+        swings, expected = sign * (up - up.mean()), self._expected - self._expected.mean()
+        fits = [correlation(swings, np.roll(expected, k)) for k in (0, FINE_PHASES // 2)]
         values = {EXCHANGED: fits[1] - fits[0], SIGN: max(0.0, -float(up.min()) / largest)}
         # with the sensor of the other foot, the next checks would compare stance with swing
         if not self.is_contact and values[EXCHANGED] < FOOT_LOAD_LIMITS[EXCHANGED]:
@@ -261,14 +263,14 @@ class FootLoadCheck(Observer):
             if sign > 0.0:
                 values[SCALE] = self._scale_factor(force)
                 is_step = all(values[kind] < FOOT_LOAD_LIMITS[kind] for kind in (SIGN, ZERO))
-                if is_step and np.isnan([each.unexplained_nm for each in cycles]).all():
+                if is_step and np.isnan(self._unexplained_nm).all():
                     # without a torque, its size as a step
                     values[SCALE] = max(1.0, USUAL_PEAK_N[0] / largest, largest / USUAL_PEAK_N[1])
         return values
 
     def _is_above_noise(self, up: Floats) -> bool:
         """True if the mean vertical force (n,) changes within a gait cycle by more than its noise."""
-        cycles = np.array([self._stance.up @ each.force_n for each in self._cycles])
+        cycles = self._up_n
         noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
         return float(up.std()) > _NOISE_SIGMAS * noise
 
@@ -278,7 +280,7 @@ class FootLoadCheck(Observer):
         Unlike in `_is_above_noise`, steps that differ or are missed are a load, and one cycle in which the
         sensor failed does not count: most phases are in swing, and most cycles are sound.
         """
-        cycles = np.array([self._stance.up @ each.force_n for each in self._cycles])
+        cycles = self._up_n
         if len(cycles) < _LEAST_CYCLES:
             return False
         noise = _OF_MEDIAN * float(np.median(np.abs(cycles - np.median(cycles, axis=0))))
@@ -286,7 +288,7 @@ class FootLoadCheck(Observer):
 
     def _scale_factor(self, force: Floats) -> float:
         """Factor between the load and its estimate from the drive torque, at least 1; NaN if unknown."""
-        unexplained = np.mean([each.unexplained_nm for each in self._cycles], axis=0)
+        unexplained = np.mean(self._unexplained_nm, axis=0)
         if not np.isfinite(unexplained).all():
             return math.nan
         needed = -np.einsum("cn,cn->n", force, self._toe_per_turn)
@@ -299,7 +301,7 @@ class FootLoadCheck(Observer):
         variance = float(np.mean((residual - shown * of_load) ** 2)) + self._model_nm**2
         sigma = math.sqrt(variance * FINE_PHASES / square / _INDEPENDENT_PHASES)
         # the part that the twin explains already
-        shown += float(np.mean([each.acted for each in self._cycles]))
+        shown += float(np.mean(self._have_acted))
         if shown > 1.0:
             return shown if shown > _SURE_SIGMAS * sigma else math.nan
         return min(1.0 / shown, 1.0e3) if 0.0 < shown < 1.0 - 2.0 * sigma else 1.0
@@ -315,10 +317,3 @@ def _stuck_fraction(load: LoadProfile) -> float:
     """Fraction of the largest force, of either sign, that is constant over a gait cycle; 1 if it is stuck."""
     largest = max(abs(load.least_n), abs(load.largest_n))
     return 1.0 - min(1.0, (load.largest_n - load.least_n) / largest) if largest > 0.0 else 1.0
-
-
-def _correlation(one: Floats, other: Floats) -> float:
-    """Correlation coefficient; 0 if one of the series is constant."""
-    a, b = one - one.mean(), other - other.mean()
-    size = math.sqrt(float(a @ a) * float(b @ b))
-    return float(a @ b) / size if size > 0.0 else 0.0

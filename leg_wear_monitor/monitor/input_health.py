@@ -1,7 +1,6 @@
 """The input, judged before any mechanical cause: rates, unused samples, and faults that no leg can have."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping
 
 import attrs
@@ -31,50 +30,35 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, TorqueProf
 _LEAST_TORQUES = 10
 
 
-@attrs.frozen
-class TorqueRange:
-    """Torques without a fault: their number, extremes, and how many are at each extreme or saturated."""
+def stuck_fraction(samples: Samples) -> float:
+    """Fraction of the torques that repeat the largest or the smallest one; NaN while there are few.
 
-    number: int = 0
-    least_nm: float = math.inf
-    largest_nm: float = -math.inf
-    at_least: int = 0
-    at_largest: int = 0
-
-    @property
-    def stuck_fraction(self) -> float:
-        """Fraction of the torques that repeat an extreme; NaN while there are few."""
-        if self.number < _LEAST_TORQUES:
-            return math.nan
-        repeated = max(self.at_least, self.at_largest)
-        return repeated / self.number if repeated > 1 else 0.0
+    Efforts in crank samples are torques as well.
+    """
+    torques = samples["torque_nm"][samples["fault"] == NO_FAULT]
+    torques = torques[np.isfinite(torques)]
+    if len(torques) < _LEAST_TORQUES:
+        return math.nan
+    repeated = max(np.count_nonzero(torques == end) for end in (torques.min(), torques.max()))
+    return repeated / len(torques) if repeated > 1 else 0.0
 
 
-def with_torques(before: TorqueRange, samples: Samples) -> TorqueRange:
-    """Range extended by the torques of more samples, including efforts in crank samples."""
-    found = samples["torque_nm"][samples["fault"] == NO_FAULT]
-    found = found[np.isfinite(found)]
-    if not len(found):
-        return before
-    least, largest = min(before.least_nm, float(found.min())), max(before.largest_nm, float(found.max()))
-    return TorqueRange(
-        before.number + len(found),
-        least,
-        largest,
-        int(np.count_nonzero(found == least)) + (before.at_least if least == before.least_nm else 0),
-        int(np.count_nonzero(found == largest)) + (before.at_largest if largest == before.largest_nm else 0),
-    )
+def input_health(before: Intake, after: Intake, samples: Samples, is_whole: bool) -> dict[str, float]:
+    """Health of the input between two counts; an unknown value is NaN.
 
-
-@attrs.frozen(kw_only=True)
-class InputHealth:
-    """Input statistics over a time; an unknown value is NaN.
-
-    Attributes
+    Parameters
     ----------
+    before, after : Intake
+    samples : (n,) array
+        Samples between the two counts.
+    is_whole : bool
+        True if all received samples were counted; otherwise the values over time are unknown.
+
+    Returns
+    -------
     duration_s : float
-        Length of this time; NaN if it is unknown, or stamps did not advance.
-    rate_hz : dict of str to float
+        Length of this time; unknown if stamps did not advance.
+    crank_rate_hz, drive_torque_rate_hz and so on : float
         Used samples per second, by the names of `KINDS`.
     bad_fraction : float
         Fraction of the samples that were not used: faulty, repeated, late, with a stray stamp, or outliers.
@@ -82,27 +66,7 @@ class InputHealth:
     lost_fraction : float
         Fraction of the time in which the leg was not tracked.
     stuck_torque_fraction : float
-        Fraction of the torque samples that repeat the largest or the smallest one; 1 if all
-        are equal. Unknown where the leg stood in this time: a torque at rest does not change.
-    """
-
-    duration_s: float
-    rate_hz: dict[str, float]
-    bad_fraction: float
-    lost_fraction: float
-    stuck_torque_fraction: float
-
-
-def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool) -> InputHealth:
-    """Health of the input between two counts.
-
-    Parameters
-    ----------
-    before, after : Intake
-    torque : TorqueRange
-        Range of the torques between the two counts.
-    is_whole : bool
-        True if all received samples were counted; otherwise the values over time are unknown.
+        Of `stuck_fraction`. Unknown where the leg stood in this time: a torque at rest does not change.
     """
     span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
     is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
@@ -111,13 +75,13 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
     others = of_other_joints(before, after)
     received = after.received - before.received - others
     stood = after.standing_s > before.standing_s
-    return InputHealth(
-        duration_s=duration_s,
-        rate_hz={name: (used - before.used[name]) / duration_s for name, used in after.used.items()},
-        bad_fraction=(unused(after) - unused(before) - others) / received if received else math.nan,
-        lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
-        stuck_torque_fraction=math.nan if stood else torque.stuck_fraction,
-    )
+    return {
+        "duration_s": duration_s,
+        **{f"{name}_rate_hz": (used - before.used[name]) / duration_s for name, used in after.used.items()},
+        "bad_fraction": sum(_unused(after, before, 0, others).values()) / received if received else math.nan,
+        "lost_fraction": min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
+        "stuck_torque_fraction": math.nan if stood else stuck_fraction(samples),
+    }
 
 
 def of_other_joints(before: Intake, after: Intake) -> int:
@@ -130,53 +94,31 @@ def of_other_joints(before: Intake, after: Intake) -> int:
     return after.faulty[name] - before.faulty[name] if has_crank else 0
 
 
-def unused(counts: Intake) -> int:
-    """Number of unused samples."""
-    faulty = sum(counts.faulty.values())
-    return faulty + sum(int(getattr(counts, name)) for name in _DROPPED)
-
-
-# Sentences on unused samples: their number, the fault, and the remedy.
+# Sentences on unused samples: how many of how many, the fault, and the remedy.
 
 
 _WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
 
 _DROPPED = ("duplicates", "late", "stray_stamps", "outliers", "load_outliers")
 
-_SENTENCES = {
-    "zero_stamp": "have a zero stamp: set header.stamp",
-    "missing_joint": "do not name the crank {crank!r} exactly once: set crank_joint to its name in "
-    "joint_states",
-    "empty": "have no name or no position",
-    "wrong_length": "have different numbers of positions, velocities or efforts and names",
-    "not_finite": "have a value that is NaN or infinite ({where})",
-    "undecodable": "cannot be decoded: wrong type or encoding",
-    "wrong_type": "are of a type that is not read",
-    "out_of_range": "have an impossible value or a torque far from the other torques (units are rad and N m)",
-    "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
-    "late": "arrive more than 20 ms after newer ones",
-    "stray_stamps": "have a stamp far from the other stamps: check the clock of the sender",
-    "outliers": "have an angle far from the motion of the crank",
-    "load_outliers": "have a foot load far from the samples before and after: check the cable of the sensor",
-}
-
 _STREAMS = {CRANK: "the crank", TORQUE: "drive_torque", LOAD: "foot_load"}
 
 
-def with_not_finite(before: Mapping[str, int], samples: Samples) -> Mapping[str, int]:
-    """Number of samples per stream with a NaN or infinite value, after adding the given samples."""
-    counts = Counter(before)
+def _not_finite(samples: Samples) -> str:
+    """Streams of samples with a value that is NaN or infinite, and their numbers."""
+    counts = []
     for kind, name in _STREAMS.items():
         own = samples[samples["kind"] == kind]
         finite = np.isfinite(own[KINDS[kind].value])
         is_odd = ~finite.all(axis=tuple(range(1, finite.ndim)))  # a force has two components
         is_odd &= (own["fault"] == NO_FAULT) & (own["stamp_ns"] > 0)
-        counts[name] += int(np.count_nonzero(is_odd | (own["fault"] == NOT_FINITE)))
-    return counts
+        number = np.count_nonzero(is_odd | (own["fault"] == NOT_FINITE))
+        counts += [f"{number} of {name}"] if number else []
+    return ", ".join(counts)
 
 
 def causes(
-    before: Intake, after: Intake, withheld: int, config: MonitorConfig, not_finite: Mapping[str, int]
+    before: Intake, after: Intake, withheld: int, samples: Samples, crank: str, texts: Mapping[str, str]
 ) -> list[str]:
     """Sentences on the unused samples between two counts, the most frequent cause first.
 
@@ -185,18 +127,20 @@ def causes(
     before, after : Intake
     withheld : int
         Number of out-of-range samples that a different sentence reports.
-    config : MonitorConfig
-        Gives the name of the crank.
-    not_finite : mapping of str to int
-        Of `with_not_finite`, between the two counts.
+    samples : (n,) array
+        Samples between the two counts.
+    crank : str
+        Name of the crank.
+    texts : mapping of str to str
+        Sentences by cause.
     """
     others = of_other_joints(before, after)
     received = after.received - before.received - others
     lost = _unused(after, before, withheld, others)
     frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
-    where = ", ".join(f"{number} of {stream}" for stream, number in not_finite.items() if number)
+    words = {"crank": crank, "where": _not_finite(samples)}
     sentences = [
-        f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint, where=where)}"
+        f"{lost[name]} of {received} samples {texts[name].format(**words)}"
         for name in sorted(frequent, key=lambda name: -lost[name])
     ]
     unused = sum(lost.values())
@@ -207,54 +151,19 @@ def causes(
 
 
 def _unused(after: Intake, before: Intake, withheld: int, others: int) -> Mapping[str, int]:
+    """Numbers of unused samples between two counts, by cause."""
     lost = {name: count - before.faulty[name] for name, count in after.faulty.items()}
     lost["out_of_range"] -= withheld
     lost[FAULTS[MISSING_JOINT]] -= others
     return lost | {name: getattr(after, name) - getattr(before, name) for name in _DROPPED}
 
 
-# Pauses in a stream of samples: times without a recording, as opposed to faults of the input.
-
-
-@attrs.frozen
-class Pauses:
-    """Pauses between recordings.
-
-    Attributes
-    ----------
-    number : int
-    total_s : float
-    passed_before_s : float
-        Part of the pauses before the last one that the twin's unmonitored time includes.
-    last_s : float
-        Length of the last pause.
-    unmonitored_s : float
-        The twin's unmonitored time when the last pause began; it includes the pause once the leg is tracked
-        again.
-    """
-
-    number: int = 0
-    total_s: float = 0.0
-    passed_before_s: float = 0.0
-    last_s: float = 0.0
-    unmonitored_s: float = 0.0
-
-    def passed_s(self, unmonitored_s: float) -> float:
-        """Part of the pauses that the twin's unmonitored time includes [s]."""
-        return self.passed_before_s + min(self.last_s, max(0.0, unmonitored_s - self.unmonitored_s))
-
-    def with_pause(self, pause_s: float, unmonitored_s: float) -> "Pauses":
-        """Pauses with one more, at a value of the twin's unmonitored time [s]."""
-        return Pauses(
-            self.number + 1, self.total_s + pause_s, self.passed_s(unmonitored_s), pause_s, unmonitored_s
-        )
-
-
 # Faults of a stream that no leg can have, judged on about a gait cycle of samples.
 #
-# Each fault has a rule: its code, its stream, a predicate that gives the words of its sentence, the sentence,
-# and the remedy. The first rule of a stream that holds is the fault. While it is present, the gait cycles of
-# this stream say nothing of the leg: they raise no mechanical alarm, and no estimator uses them.
+# Each fault has a code, a predicate that gives the words of its sentence, and a rule of the verdict with the
+# sentence and the remedy. The first predicate of a stream that holds is the fault. While it is present, the
+# gait cycles of this stream say nothing of the leg: they raise no mechanical alarm, and no estimator uses
+# them.
 
 
 @attrs.frozen(eq=False)
@@ -455,120 +364,31 @@ def _spikes(one: Stretch) -> Words | None:
     return {"percent": f"{100.0 * one.spikes:.1f}"} if one.spikes else None
 
 
-@attrs.frozen(kw_only=True)
-class InputRule:
-    """A fault of a stream.
-
-    Attributes
-    ----------
-    code : str
-    kind : int
-        `CRANK` or `TORQUE`, the stream.
-    words : callable or None
-        Words of the sentence if a stretch has this fault; None if a different part of `InputJudge` finds it.
-    why, do : str
-        Sentence and remedy, with words in braces.
-    needs_motion : bool
-        True if it can only be seen while the crank turns.
-    """
-
-    code: str
-    kind: int
-    words: Callable[[Stretch], Words | None] | None
-    why: str
-    do: str
-    needs_motion: bool = True
-
-
 UNIT, HELD, JUMP = "CRANK_UNIT", "CRANK_HELD", "CRANK_JUMP"
 SPIKES, NOT_OF_GAIT = "TORQUE_SPIKES", "TORQUE_NOT_OF_GAIT"
-_NO_JOINT = "; no joint is observed"
-INPUT_RULES = (
-    InputRule(
-        code="CRANK_FROZEN",
-        kind=CRANK,
-        words=_frozen,
-        needs_motion=False,
-        why="the crank has not moved since {since}, but the drive torque changes",
-        do="check the crank's encoder and its driver; if the leg stands under a changing load, let it walk",
-    ),
-    InputRule(
-        code=UNIT,
-        kind=CRANK,
-        words=_unit,
-        needs_motion=False,
-        why="the crank angle advances at {size} of the commanded cadence: its unit seems to be turns",
-        do="publish radians, or set table.units.crank_angle of a table; for a continuous position in turns, "
-        "set crank.gear_ratio to {ratio}",
-    ),
-    InputRule(
-        code="CRANK_STAMPS",
-        kind=CRANK,
-        words=_stamps,
-        why="the stamps of the crank scatter by {size} ({percent} % of the sampling period), and its angle "
-        "does not: the samples are stamped on arrival",
-        do="let the driver stamp each sample when it is measured (header.stamp)",
-    ),
-    InputRule(
-        code=HELD,
-        kind=CRANK,
-        words=lambda one: _held(one.angle, one.crank_ns, one.speed),
-        why=(
-            "the crank angle changes only with every {size}th sample, at {rate} Hz: it is repeated in between"
-        ),
-        do="publish each angle once, with the stamp of its measurement; in a table, delete the repeated rows",
-    ),
-    InputRule(
-        code=JUMP,
-        kind=CRANK,
-        words=None,
-        why="the crank angle jumped by {size} at {since} and did not return: its zero is no longer known",
-        do="check the encoder for an overflow or lost counts, set crank.offset_rad again, and restart the "
-        "monitor",
-    ),
-    InputRule(
-        code=SPIKES,
-        kind=TORQUE,
-        words=_spikes,
-        why="{percent} % of the drive torques are spikes or NaN since {since}" + _NO_JOINT,
-        do="check the cable of the torque sensor and its supply; publish a torque with each measurement only",
-    ),
-    InputRule(
-        code="TORQUE_SATURATED",
-        kind=TORQUE,
-        words=_saturated,
-        why="{percent} % of the drive torques are at the end of the sensor's range since {since} ({size})"
-        + _NO_JOINT,
-        do="use a torque sensor with a wider range, or raise the limit of the driver",
-    ),
-    InputRule(
-        code="TORQUE_CONSTANT",
-        kind=TORQUE,
-        words=_constant,
-        why="the drive torque has not changed since {since}: it stays at {size}" + _NO_JOINT,
-        do="check drive_torque.source, its topic or axis, and the sensor; until then, rock the joints by "
-        "hand regularly",
-    ),
-    InputRule(
-        code="TORQUE_HELD",
-        kind=TORQUE,
-        words=lambda one: (
-            _held(one.torque, one.torque_ns, one.speed) if one.turned_rad > _MOVING_RAD else None
-        ),
-        why="the drive torque changes only with every {size}th sample, at {rate} Hz: samples are repeated"
-        + _NO_JOINT,
-        do="publish each torque once, with the stamp of its measurement; in a table, delete repeated values",
-    ),
-    InputRule(
-        code=NOT_OF_GAIT,
-        kind=TORQUE,
-        words=None,
-        why="the drive torque has not followed the gait since {since}: it resembles neither the "
-        "prediction nor the previous step" + _NO_JOINT,
-        do="check topic, unit and source of the drive torque; until then, rock the joints by hand regularly",
-    ),
-)
-"""In the order of precedence: faults of the crank come first, because torques are compared at its angles."""
+INPUT_FAULTS: Mapping[str, Callable[[Stretch], Words | None]] = {
+    "CRANK_FROZEN": _frozen,
+    UNIT: _unit,
+    "CRANK_STAMPS": _stamps,
+    HELD: lambda one: _held(one.angle, one.crank_ns, one.speed),
+    JUMP: lambda _: None,
+    SPIKES: _spikes,
+    "TORQUE_SATURATED": _saturated,
+    "TORQUE_CONSTANT": _constant,
+    "TORQUE_HELD": lambda one: _held(one.torque, one.torque_ns, one.speed),
+    NOT_OF_GAIT: lambda _: None,
+}
+"""Words of the sentence if a stretch has the fault, by its code, which begins with its stream.
+
+They are in the order of precedence: faults of the crank come first, because torques are compared at its
+angles. `InputJudge` finds jumps of the angle and torques that are not of the gait in a different way.
+"""
+_ALSO_AT_REST = ("CRANK_FROZEN", UNIT)
+
+
+def kind_of(code: str) -> int:
+    """Stream of a fault."""
+    return CRANK if code.startswith("CRANK") else TORQUE
 
 
 @attrs.frozen
@@ -593,34 +413,24 @@ class InputFault:
     shown: int = 1
 
     @property
-    def rule(self) -> InputRule:
-        """Its rule."""
-        return next(rule for rule in INPUT_RULES if rule.code == self.code)
-
-    @property
     def texts(self) -> dict[str, str]:
         """Words for sentence and remedy, with its begin."""
         return {**self.words, "since": time_words(self.since_ns)}
 
-    @property
-    def sentence(self) -> str:
-        """The fault, and the remedy."""
-        return f"{self.rule.why}. {self.rule.do[0].upper()}{self.rule.do[1:]}".format(**self.texts)
-
 
 def judged(one: Stretch) -> dict[str, Words]:
     """Faults of a stretch by their codes: the first one of each stream."""
-    found: dict[str, Words] = {}
+    found: dict[int, tuple[str, Words]] = {}
     is_moving = one.turned_rad > _MOVING_RAD
-    for kind, number in ((CRANK, len(one.angle)), (TORQUE, min(len(one.angle), len(one.torque)))):
-        for rule in INPUT_RULES:
-            if rule.kind != kind or rule.words is None or number < _LEAST:
-                continue
-            words = rule.words(one) if is_moving or not rule.needs_motion else None
-            if words is not None:
-                found[rule.code] = words
-                break
-    return found
+    numbers = {CRANK: len(one.angle), TORQUE: min(len(one.angle), len(one.torque))}
+    for code, words_of in INPUT_FAULTS.items():
+        kind = kind_of(code)
+        if kind in found or numbers[kind] < _LEAST or not (is_moving or code in _ALSO_AT_REST):
+            continue
+        words = words_of(one)
+        if words is not None:
+            found[kind] = code, words
+    return dict(found.values())
 
 
 def _phase_means(profile: TorqueProfile) -> tuple[Floats, Floats] | None:
@@ -639,8 +449,8 @@ def _phase_means(profile: TorqueProfile) -> tuple[Floats, Floats] | None:
     return means[0], means[1]
 
 
-def _correlation(one: Floats, other: Floats) -> float:
-    """Correlation of two torques (n,) without their means; 0 if one of them is constant."""
+def correlation(one: Floats, other: Floats) -> float:
+    """Correlation of two values (n,) without their means; 0 if one of them is constant."""
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float(one @ other) / size if size > 0.0 else 0.0
 
@@ -648,7 +458,7 @@ def _correlation(one: Floats, other: Floats) -> float:
 def _likeness(one: Floats, other: Floats) -> float:
     """Largest size of the correlation, with the other moved by up to a twelfth of a turn, or reversed."""
     most = len(one) // 12
-    return max(abs(_correlation(one, np.roll(other, k))) for k in range(-most, most + 1))
+    return max(abs(correlation(one, np.roll(other, k))) for k in range(-most, most + 1))
 
 
 _JUMP_RAD = 0.3  # deviation of an angle from a steady motion
@@ -663,43 +473,6 @@ _AFTER = 3  # commanded gait cycles without a fault, after which it is over
 _NOT_YET = {JUMP: 5, NOT_OF_GAIT: 1}
 
 
-@attrs.define
-class JudgeState:
-    """State of an `InputJudge`; every value is immutable.
-
-    Attributes
-    ----------
-    pieces : tuple of Samples
-        Samples of the last evaluation periods.
-    spikes : tuple of int
-        Torque outliers up to the end of each.
-    now : tuple of Samples
-        Samples of the present one.
-    faults : mapping of str to InputFault
-        By their codes.
-    last : Samples
-        Last crank samples.
-    jumped_rad : float
-        Sum of the jumps of the crank's angle, less whole turns.
-    before : (n,) array or None
-        Torque of the gait cycle before, in equal phases.
-    has_refused : bool
-        True if a gait cycle of this evaluation period was refused.
-    was_refused : bool
-        True if the last gait cycle was refused.
-    """
-
-    pieces: tuple[Samples, ...] = ()
-    spikes: tuple[int, ...] = ()
-    now: tuple[Samples, ...] = ()
-    faults: Mapping[str, InputFault] = attrs.field(factory=dict)
-    last: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
-    jumped_rad: float = 0.0
-    before: Floats | None = None
-    has_refused: bool = False
-    was_refused: bool = False
-
-
 class InputJudge:
     """Judges the samples of crank and drive torque before anything else looks at them.
 
@@ -708,19 +481,31 @@ class InputJudge:
     config : MonitorConfig
     size_nm : float
         RMS of the predicted drive torque.
+
+    Attributes
+    ----------
+    was_refused : bool
+        True if the last gait cycle was refused.
     """
 
     def __init__(self, config: MonitorConfig, size_nm: float) -> None:
         self.config, self._size_nm = config, size_nm
         self._commanded = abs(config.cadence.commanded_rpm) * TURN / 60.0
         self._after_ns = round(_AFTER * 1.0e9 * TURN / self._commanded)
-        self.state = JudgeState()
+        self._pieces: tuple[Samples, ...] = ()  # samples of the last evaluation periods
+        self._spikes: tuple[int, ...] = ()  # torque outliers up to the end of each
+        self._now: tuple[Samples, ...] = ()  # samples of the present one
+        self._faults: dict[str, InputFault] = {}  # by their codes
+        self._last = np.zeros(0, GAIT_SAMPLE)  # last crank samples
+        self._jumped_rad = 0.0  # sum of the jumps of the crank's angle, less whole turns
+        self._before: Floats | None = None  # torque of the gait cycle before, in equal phases
+        self._has_refused = False  # whether a gait cycle of this evaluation period was refused
+        self.was_refused = False
 
     @property
     def faults(self) -> tuple[InputFault, ...]:
         """Faults that are present, in the order of their rules."""
-        found = self.state.faults
-        shown = (found[rule.code] for rule in INPUT_RULES if rule.code in found)
+        shown = (self._faults[code] for code in INPUT_FAULTS if code in self._faults)
         return tuple(one for one in shown if one.shown > _NOT_YET.get(one.code, 0))
 
     @property
@@ -728,14 +513,14 @@ class InputJudge:
         """Stamp until which a stream with a fault was in order, by its kind: some gait cycles before it."""
         begun: dict[int, int] = {}
         for one in self.faults:
-            kinds = (CRANK, TORQUE) if one.rule.kind == CRANK else (TORQUE,)
+            kinds = (CRANK, TORQUE) if kind_of(one.code) == CRANK else (TORQUE,)
             for kind in kinds:
                 begun[kind] = min(one.since_ns - self._after_ns, begun.get(kind, one.since_ns))
         return begun
 
     def add_samples(self, piece: Samples) -> None:
         """Add samples in the order of arrival."""
-        self.state.now = (*self.state.now, piece)
+        self._now = (*self._now, piece)
 
     def end_period(self, spikes: int, is_withheld: bool) -> bool:
         """Judge the last samples at the end of an evaluation period.
@@ -752,58 +537,56 @@ class InputJudge:
         bool
             True if a gait cycle was refused in this period.
         """
-        state = self.state
-        has_refused, state.has_refused = state.has_refused, False
-        joined = np.concatenate(state.now) if state.now else np.zeros(0, GAIT_SAMPLE)
-        state.pieces = (*state.pieces, joined)[-_KEPT_PERIODS:]
-        state.spikes = (*state.spikes, spikes)[-_KEPT_PERIODS - 1 :]
-        state.now = ()
+        has_refused, self._has_refused = self._has_refused, False
+        joined = np.concatenate(self._now) if self._now else np.zeros(0, GAIT_SAMPLE)
+        self._pieces = (*self._pieces, joined)[-_KEPT_PERIODS:]
+        self._spikes = (*self._spikes, spikes)[-_KEPT_PERIODS - 1 :]
+        self._now = ()
         cranks = of_crank(joined)
         self._look_for_jumps(cranks)
-        if {UNIT, HELD} & state.faults.keys():  # the steps of such angles look like jumps, at the end as well
-            state.jumped_rad = 0.0
-            state.faults = {code: one for code, one in state.faults.items() if code != JUMP}
-        if state.jumped_rad and len(cranks):
-            words, stamps = {"size": amount(state.jumped_rad, "rad")}, cranks["stamp_ns"]
+        if {UNIT, HELD} & self._faults.keys():  # the steps of such angles look like jumps, at the end as well
+            self._jumped_rad = 0.0
+            self._faults = {code: one for code, one in self._faults.items() if code != JUMP}
+        if self._jumped_rad and len(cranks):
+            words, stamps = {"size": amount(self._jumped_rad, "rad")}, cranks["stamp_ns"]
             self._note(JUMP, words, int(stamps[0]), int(stamps[-1]))
-        last = np.concatenate(state.pieces[-_PERIODS:])
-        kept = np.concatenate(state.pieces)
-        found = spikes - state.spikes[0] + _without_number(kept)
+        last = np.concatenate(self._pieces[-_PERIODS:])
+        kept = np.concatenate(self._pieces)
+        found = spikes - self._spikes[0] + _without_number(kept)
         part = found / max(1, found + len(of_torque(kept)))
-        most = _FEWER_SPIKES if SPIKES in state.faults else _SPIKES
+        most = _FEWER_SPIKES if SPIKES in self._faults else _SPIKES
         if found <= _LEAST_SPIKES or part <= most:
             part = 0.0
         self._take(Stretch.of(last, part, self._size_nm, self.config))
         if is_withheld:
-            state.jumped_rad = 0.0
-            state.faults = {code: one for code, one in state.faults.items() if one.rule.kind != CRANK}
+            self._jumped_rad = 0.0
+            self._faults = {code: one for code, one in self._faults.items() if kind_of(code) != CRANK}
         return has_refused
 
     def end_cycle(self, statistics: CycleStatistics) -> frozenset[int]:
         """Judge a gait cycle; returns the streams that contain no information about the leg in it."""
-        state = self.state
-        samples = np.concatenate([*state.pieces, *state.now])
+        samples = np.concatenate([*self._pieces, *self._now])
         end_ns = statistics.stamp_ns
         own = samples[(samples["stamp_ns"] >= statistics.begin_ns) & (samples["stamp_ns"] < end_ns)]
         self._take(Stretch.of(own, 0.0, self._size_nm, self.config))
         is_strange = self._is_strange(statistics.torque_profile)
         if is_strange:
             self._note(NOT_OF_GAIT, {}, statistics.begin_ns, end_ns)
-        kinds = {one.rule.kind for one in state.faults.values()}
-        state.was_refused = bool(kinds)
-        state.has_refused |= state.was_refused
+        kinds = set(map(kind_of, self._faults))
+        self.was_refused = bool(kinds)
+        self._has_refused |= self.was_refused
         return frozenset(kinds | ({TORQUE} if CRANK in kinds else set()))
 
     def _is_strange(self, profile: TorqueProfile) -> bool:
         """True if a torque resembles neither the prediction nor the previous gait cycle."""
-        means, before = _phase_means(profile), self.state.before
-        self.state.before = None if means is None else means[0]
+        means, before = _phase_means(profile), self._before
+        self._before = None if means is None else means[0]
         if means is None:
             return False
         if _likeness(*means) >= _ALIKE:
             return False
         is_repeated = before is not None and len(before) == len(means[0])
-        return not (is_repeated and before is not None and _correlation(means[0], before) >= _ALIKE)
+        return not (is_repeated and before is not None and correlation(means[0], before) >= _ALIKE)
 
     def _take(self, one: Stretch) -> None:
         """Note the faults in a stretch, and forget faults that have not occurred for some gait cycles."""
@@ -812,22 +595,22 @@ class InputJudge:
         first_ns = int(one.crank_ns[0]) if len(one.crank_ns) else newest_ns
         for code, words in judged(one).items():
             self._note(code, words, first_ns, newest_ns)
-        kept = self.state.faults.values()
-        self.state.faults = {
+        kept = self._faults.values()
+        self._faults = {
             one.code: one for one in kept if abs(newest_ns - one.last_ns) <= self._after_ns or not newest_ns
         }
 
     def _note(self, code: str, words: Words, since_ns: int, last_ns: int) -> None:
-        known = self.state.faults.get(code)
+        known = self._faults.get(code)
         now = InputFault(code, since_ns, last_ns, words)
         if known is not None:
             now = attrs.evolve(now, since_ns=known.since_ns, shown=known.shown + 1)
-        self.state.faults = {**self.state.faults, code: now}
+        self._faults = {**self._faults, code: now}
 
     def _look_for_jumps(self, cranks: Samples) -> None:
         """Add up the steps of the crank's angle that no motion makes: outliers come back, a jump stays."""
-        last = np.append(self.state.last, cranks)
-        self.state.last = last[-_AMONG - 1 :]
+        last = np.append(self._last, cranks)
+        self._last = last[-_AMONG - 1 :]
         step = (np.diff(last["crank_angle_rad"]) + math.pi) % TURN - math.pi
         passed_s = 1.0e-9 * np.diff(last["stamp_ns"])
         known = (passed_s > 0.0) & (passed_s * self._commanded <= _JUMP_STEP_RAD)
@@ -839,5 +622,5 @@ class InputJudge:
         change = (change + math.pi) % TURN - math.pi
         is_known = sliding_window_view(known, _AMONG + 1).all(axis=1)
         jumps = float(change[is_known & (np.abs(change) > _JUMP_RAD)].sum())
-        jumped_rad = (self.state.jumped_rad + jumps + math.pi) % TURN - math.pi
-        self.state.jumped_rad = jumped_rad if abs(jumped_rad) > _JUMP_RAD else 0.0
+        jumped_rad = (self._jumped_rad + jumps + math.pi) % TURN - math.pi
+        self._jumped_rad = jumped_rad if abs(jumped_rad) > _JUMP_RAD else 0.0

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from leg_wear_monitor.compiled.kernel import Record, entry, kernel, new_records, record_of
+from leg_wear_monitor.monitor.verdict.verdict import table
 from leg_wear_monitor.twin import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
@@ -326,18 +327,10 @@ class InputGuard:
     @property
     def cause(self) -> str:
         """Reason why crank samples are withheld at present, and the remedy; empty if none are."""
+        texts, ratio = table().samples, self.speed_ratio
         if self.sources > 1:
-            return (
-                "two sources of the crank angle disagree: two publishers, or an encoder that jumps. "
-                "Nothing is monitored before one source remains"
-            )
-        ratio = self.speed_ratio
+            return texts["two_sources"]
         if math.isnan(ratio):
             return ""
-        text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, so nothing is monitored: "
-        if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
-            return (
-                text
-                + "its unit seems to be degrees; publish radians, or set table.units.crank_angle of a table"
-            )
-        return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
+        is_in_degrees = _DEGREES / _NEAR < ratio < _DEGREES * _NEAR
+        return texts["degrees" if is_in_degrees else "fast"].format(ratio=f"{ratio:.2g}")

@@ -177,7 +177,7 @@ class MonitoredLeg(WearModel):
             alarms=tuple(alarms.values()),
             has_cycle=last is not None,
             # the torque of a refused gait cycle has come, and is not compared
-            has_torque=last is not None and (last.torque_samples > 0 or self.judge.state.was_refused),
+            has_torque=last is not None and (last.torque_samples > 0 or self.judge.was_refused),
             mismatch=last.torque_mismatch if last else math.nan,
             mismatch_limit=config.limits.torque_mismatch,
             torque_causes=torque.causes,

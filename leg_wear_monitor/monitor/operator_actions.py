@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms import Alarm, joint_of
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
+from leg_wear_monitor.monitor.forecast.forecaster import MeasurementResult
 from leg_wear_monitor.monitor.gait_evidence import MismatchWindow
 from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement, VerdictEvent
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
@@ -41,49 +41,206 @@ def alarm_words(cleared: Iterable[Alarm], kept: Iterable[Alarm]) -> str:
     return f"cleared: {names[0]}; still present: {names[1]}"
 
 
-def acknowledge(leg: MonitoredLeg, stamp_ns: int) -> Cleared:
-    """See `WearMonitor.acknowledge`."""
-    cleared, kept = leg.evaluation.board.acknowledge(leg.unmeasured)
-    if alarm_specs.MISMATCH.name() in leg.unmeasured:
-        leg.torque.mismatch = MismatchWindow()
-    ledger = leg.accounting.ledger
-    has_lost = ledger is not None and ledger.acknowledge_loss()
-    _note_alarms(leg, stamp_ns)
-    note_verdict(leg, stamp_ns)
-    if cleared or kept or has_lost:
+class OperatorActions:
+    """Actions of an operator on a monitor."""
+
+    _leg: MonitoredLeg
+
+    def acknowledge(self, stamp_ns: int) -> Cleared:
+        """Acknowledge all alarms, and the interruption of the previous run.
+
+        Returns
+        -------
+        cleared, kept : tuple of Alarm
+            Alarms that had returned to normal, and alarms that stay until they do.
+        """
+        leg, stamp_ns = self._leg, int(stamp_ns)
+        cleared, kept = leg.evaluation.board.acknowledge(leg.unmeasured)
+        if alarm_specs.MISMATCH.name() in leg.unmeasured:
+            leg.torque.mismatch = MismatchWindow()
+        ledger = leg.accounting.ledger
+        has_lost = ledger is not None and ledger.acknowledge_loss()
+        _note_alarms(leg, stamp_ns)
+        note_verdict(leg, stamp_ns)
+        if cleared or kept or has_lost:
+            leg.keep()
+        return cleared, kept
+
+    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Cleared:
+        """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
+
+        Alarms of the former part are acknowledged and clear.
+
+        Returns
+        -------
+        cleared, kept : tuple of Alarm
+            Alarms that cleared, and alarms that are still raised.
+
+        Raises
+        ------
+        LegWearError
+            For a joint without clearance.
+        """
+        leg, stamp_ns = self._leg, int(stamp_ns)
+        board = leg.evaluation.board
+        was = leg.accounting.replace(joint, stamp_ns)
+        gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(leg))
+        cleared = tuple(board.alarms[name] for name in gone)
+        board.clear(gone)
+        if alarm_specs.MISMATCH.name() in gone:
+            leg.torque.mismatch = MismatchWindow()
+        self._part_changed(joint, stamp_ns)
+        leg.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
+        _note_alarms(leg, stamp_ns)
+        note_verdict(leg, stamp_ns)
         leg.keep()
-    return cleared, kept
+        return cleared, tuple(alarm for alarm in board.alarms.values() if alarm.level is not Level.OK)
 
+    def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
+        """Undo the last `reset_wear` of a joint whose part was not replaced.
 
-def reset_wear(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> Cleared:
-    """See `WearMonitor.reset_wear`."""
-    board = leg.evaluation.board
-    was = leg.accounting.replace(joint, stamp_ns)
-    gone = _rested_on(board.alarms.values(), joint, _named_for_clearance(leg))
-    cleared = tuple(board.alarms[name] for name in gone)
-    board.clear(gone)
-    if alarm_specs.MISMATCH.name() in gone:
-        leg.torque.mismatch = MismatchWindow()
-    _part_changed(leg, joint, stamp_ns)
-    leg.accounting.note(Audit(stamp_ns, who, "reset_wear", was, cleared))
-    _note_alarms(leg, stamp_ns)
-    note_verdict(leg, stamp_ns)
-    leg.keep()
-    return cleared, tuple(alarm for alarm in board.alarms.values() if alarm.level is not Level.OK)
+        Returns
+        -------
+        JointWear
+            Sum of the wear before the reset and since.
 
+        Raises
+        ------
+        LegWearError
+            For a joint without clearance, or if the ledger has no reset to undo.
+        """
+        leg, stamp_ns = self._leg, int(stamp_ns)
+        accounting, board = leg.accounting, leg.evaluation.board
+        reset, before = _last_reset(accounting, joint)
+        since = accounting.put_back(joint, before)
+        _raise_again(board, reset.alarms)
+        self._part_changed(joint, before.replaced_ns)
+        accounting.note(Audit(stamp_ns, who, "undo_reset", since))
+        _note_alarms(leg, stamp_ns)
+        note_verdict(leg, stamp_ns)
+        leg.keep()
+        return accounting.wear_of(joint)
 
-def undo_reset(leg: MonitoredLeg, joint: str, stamp_ns: int, who: str) -> JointWear:
-    """See `WearMonitor.undo_reset`."""
-    accounting, board = leg.accounting, leg.evaluation.board
-    reset, before = _last_reset(accounting, joint)
-    since = accounting.put_back(joint, before)
-    _raise_again(board, reset.alarms)
-    _part_changed(leg, joint, before.replaced_ns)
-    accounting.note(Audit(stamp_ns, who, "undo_reset", since))
-    _note_alarms(leg, stamp_ns)
-    note_verdict(leg, stamp_ns)
-    leg.keep()
-    return accounting.wear_of(joint)
+    def measure(
+        self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
+    ) -> MeasurementResult:
+        """Add a measured clearance to the ledger; forecast, alarms and verdict follow at once.
+
+        The modelled clearance stays as it is.
+
+        Parameters
+        ----------
+        joint : str
+            Its name or its label.
+        clearance_m, sigma_m : float
+            Mean radial clearance, and its standard deviation.
+        stamp_ns : int
+        who : str
+        accept : bool
+            True if the measurement counts even if it contradicts the model.
+
+        Raises
+        ------
+        LegWearError
+            For a joint without clearance, or impossible values.
+        """
+        leg, stamp_ns = self._leg, int(stamp_ns)
+        accounting, joint = leg.accounting, leg.mechanism.clearance_joint(joint)
+        wear, best = accounting.wear_of(joint), leg.estimate_of(_situation(leg, joint))
+        found = leg.forecaster.measured(
+            wear,
+            clearance_m=float(clearance_m),
+            sigma_m=float(sigma_m),
+            stamp_ns=stamp_ns,
+            who=who,
+            kept_ns=accounting.ledger.kept_ns if accounting.ledger else 0,
+            accept=accept,
+            limit_m=leg.evaluation.board.clearance_limits_m[leg.clearance_joints.index(joint)],
+        )
+        if best:
+            found = attrs.evolve(
+                found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
+            )
+        accounting.note(found.measurement)
+        self.renew_forecast()
+        before, board = leg.evaluation.board.alarms, leg.evaluation.board
+        is_ended = _compare(leg, joint, stamp_ns)
+        was, now = (alarms[alarm_specs.CLEARANCE.name(joint)] for alarms in (before, board.alarms))
+        if now.level < was.level or (now.acknowledged and not was.acknowledged):
+            accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))  # a withdrawal raises it again
+            found = attrs.evolve(found, eased=_eased(was, now))
+        _note_clearance_verdict(leg, before, joint, stamp_ns, is_ended)
+        self.renew_forecast()  # without a remaining life, if the verdict rests on data that it does not use
+        leg.keep()
+        return found
+
+    def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
+        """Withdraw a measurement: it stays in the ledger unused, and a stop that it ended returns.
+
+        Parameters
+        ----------
+        measurement : int
+            Its `id`.
+        stamp_ns : int
+            Not 0.
+        who : str
+
+        Raises
+        ------
+        LegWearError
+            If the ledger has no such measurement, or it is withdrawn already.
+        """
+        leg, stamp_ns = self._leg, int(stamp_ns)
+        accounting, board = leg.accounting, leg.evaluation.board
+        found = leg.forecaster.withdrawn(measurement, stamp_ns, who)
+        accounting.note(found)
+        if found.replaced_ns == accounting.wear_of(found.joint).replaced_ns:
+            leg.forecaster.estimate_anew(found.joint, found.replaced_ns)
+            before, joint = board.alarms, _situation(leg, found.joint)
+            for alarm in _eased_by_withdrawn(leg, found):
+                if not _ends(joint, alarm):  # a different measurement may end it as well
+                    _raise_again(board, [alarm])
+            is_ended = _compare(leg, found.joint, stamp_ns)
+            _note_alarms(leg, stamp_ns)
+            _note_clearance_verdict(leg, before, found.joint, stamp_ns, is_ended)
+        leg.keep()
+        return found
+
+    def renew_forecast(self) -> CycleReport | None:
+        """Renew the forecast now; otherwise it may be a minute old.
+
+        Returns
+        -------
+        CycleReport or None
+            The last gait cycle with the new forecast; None before the first.
+        """
+        leg, last = self._leg, self._leg.last
+        if last is None:
+            return None
+        forecast = leg.forecaster.renewed(
+            leg.worn_m(leg.twin.clearance_mean_m),
+            leg.evaluation.board.clearance_limits_m,
+            leg.is_forecast_valid(leg.verdict_report().findings),
+            leg.model_error,
+        )
+        leg.last = with_forecast(last, forecast, leg.measured)
+        return leg.last
+
+    def _part_changed(self, joint: str, replaced_ns: int) -> None:
+        """Discard the estimates of the former part, and renew the forecast."""
+        leg, last = self._leg, self._leg.last
+        leg.forecaster.replaced(joint, replaced_ns)
+        if last:  # the estimate belongs to the former part
+            joints = [
+                attrs.evolve(each, seen=None, estimated_m=None, estimated_sigma_m=None)
+                if each.joint == joint
+                else each
+                for each in last.joints
+            ]
+            leg.last = attrs.evolve(last, joints=tuple(joints))
+        for observer in leg.observers:
+            observer.replaced(leg.clearance_joints.index(joint))
+        self.renew_forecast()
 
 
 def _last_reset(accounting: Accounting, joint: str) -> tuple[Audit, JointWear]:
@@ -104,64 +261,6 @@ def _raise_again(board: AlarmBoard, alarms: Iterable[Alarm]) -> None:
     board.alarms = now | {alarm.name: alarm for alarm in known}
 
 
-def measure(
-    leg: MonitoredLeg, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool
-) -> MeasurementResult:
-    """See `WearMonitor.measure`."""
-    accounting, joint = leg.accounting, leg.mechanism.clearance_joint(joint)
-    wear, best = accounting.wear_of(joint), leg.estimate_of(_situation(leg, joint))
-    earlier = leg.forecaster.measurements
-    found = leg.forecaster.measured(
-        wear,
-        clearance_m=clearance_m,
-        sigma_m=sigma_m,
-        stamp_ns=stamp_ns,
-        who=who,
-        kept_ns=accounting.ledger.kept_ns if accounting.ledger else 0,
-        accept=accept,
-    )
-    found = attrs.evolve(
-        found,
-        limit_m=leg.evaluation.board.clearance_limits_m[leg.clearance_joints.index(joint)],
-        earlier=earlier,
-    )
-    if best:
-        found = attrs.evolve(
-            found, shown_m=best.clearance_m, shown_sigma_m=best.sigma_m, shown_by=SOURCES[best.by]
-        )
-    accounting.note(found.measurement)
-    renew_forecast(leg)
-    before, board = leg.evaluation.board.alarms, leg.evaluation.board
-    is_ended = _compare(leg, joint, stamp_ns)
-    was, now = (alarms[alarm_specs.CLEARANCE.name(joint)] for alarms in (before, board.alarms))
-    if now.level < was.level or (now.acknowledged and not was.acknowledged):
-        # withdrawing the measurement raises it again
-        accounting.note(Audit(stamp_ns, who, "measure", alarms=(was,)))
-        found = attrs.evolve(found, eased=_eased(was, now))
-    _note_clearance_verdict(leg, before, joint, stamp_ns, is_ended)
-    renew_forecast(leg)  # without a remaining life, if the verdict rests on data that it does not use
-    leg.keep()
-    return found
-
-
-def withdraw(leg: MonitoredLeg, number: int, stamp_ns: int, who: str) -> Measurement:
-    """See `WearMonitor.withdraw`."""
-    accounting, board = leg.accounting, leg.evaluation.board
-    found = leg.forecaster.withdrawn(number, stamp_ns, who)
-    accounting.note(found)
-    if found.replaced_ns == accounting.wear_of(found.joint).replaced_ns:
-        leg.forecaster.replaced(found.joint, found.replaced_ns)
-        before, joint = board.alarms, _situation(leg, found.joint)
-        for alarm in _eased_by_withdrawn(leg, found):
-            if not _ends(joint, alarm):  # a different measurement may end it as well
-                _raise_again(board, [alarm])
-        is_ended = _compare(leg, found.joint, stamp_ns)
-        _note_alarms(leg, stamp_ns)
-        _note_clearance_verdict(leg, before, found.joint, stamp_ns, is_ended)
-    leg.keep()
-    return found
-
-
 def _eased_by_withdrawn(leg: MonitoredLeg, like: Measurement) -> tuple[Alarm, ...]:
     """The alarm before the first withdrawn measurement of a part eased it."""
     part, ledger = (like.joint, like.replaced_ns), leg.accounting.ledger
@@ -177,23 +276,8 @@ def _eased(was: Alarm, now: Alarm) -> str:
     if was.cause not in (MEASURED, BOTH):
         return ""
     if now.level < was.level:
-        return "is lowered" if now.level is not Level.OK else "ends"
-    return "is acknowledged"
-
-
-def renew_forecast(leg: MonitoredLeg) -> CycleReport | None:
-    """See `WearMonitor.renew_forecast`."""
-    last = leg.last
-    if last is None:
-        return None
-    forecast = leg.forecaster.renewed(
-        leg.worn_m(leg.twin.clearance_mean_m),
-        leg.evaluation.board.clearance_limits_m,
-        leg.is_forecast_valid(leg.verdict_report().findings),
-        leg.model_error,
-    )
-    leg.last = with_forecast(last, forecast, leg.measured)
-    return leg.last
+        return "alarm_lowered" if now.level is not Level.OK else "alarm_ends"
+    return "alarm_acknowledged"
 
 
 def _situation(leg: MonitoredLeg, joint: str) -> JointSituation:
@@ -280,24 +364,6 @@ def _ends(joint: JointSituation, alarm: Alarm) -> bool:
     if alarm.cause in (MEASURED, BOTH) and not joint.is_measurement_used:
         return False  # an unused measurement does not end an alarm of an earlier measurement
     return is_surely_below(joint.limit_m, joint.measured)
-
-
-def _part_changed(leg: MonitoredLeg, joint: str, replaced_ns: int) -> None:
-    """Discard the growth and the estimates of the former part, and renew the forecast."""
-    leg.grows_anew([joint])
-    leg.forecaster.replaced(joint, replaced_ns)
-    last = leg.last
-    if last:  # the estimate belongs to the former part
-        joints = [
-            attrs.evolve(each, seen=None, estimated_m=None, estimated_sigma_m=None)
-            if each.joint == joint
-            else each
-            for each in last.joints
-        ]
-        leg.last = attrs.evolve(last, joints=tuple(joints))
-    for observer in leg.observers:
-        observer.replaced(leg.clearance_joints.index(joint))
-    renew_forecast(leg)
 
 
 def wear_words(wear: JointWear) -> str:

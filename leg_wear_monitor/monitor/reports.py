@@ -9,7 +9,6 @@ from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
-from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.situation import joint_status
 from leg_wear_monitor.monitor.verdict.verdict import verdict_of
@@ -68,9 +67,15 @@ class JointReport:
 
     @property
     def judged_clearance_m(self) -> float:
-        """Clearance to compare with the limit: the modelled clearance, or a larger measured clearance."""
-        best_estimate_m = self.forecast.now_m if self.forecast else math.nan
-        return judged_clearance_m(self.clearance_m, self.measured, best_estimate_m)
+        """Clearance that is compared with the limit: the modelled one, or a larger one by measurement.
+
+        A measurement that does not count for the forecast is still a finding on the leg.
+        """
+        measured, best_m = self.measured, self.forecast.now_m if self.forecast else math.nan
+        if measured is None:
+            return self.clearance_m
+        believed = [best_m] if measured.counts and not math.isnan(best_m) else []
+        return max(self.clearance_m, measured.clearance_m, *believed)
 
 
 @attrs.frozen(kw_only=True)
@@ -283,7 +288,7 @@ DIAGNOSTICS_PERIOD_S = 1.0
 class Status:
     """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.
 
-    ``fault_code`` is the stable name of the fault, one of `alarms.fault_codes`, of an alarm or of a verdict.
+    ``fault_code`` is the stable name of the fault: one of `VerdictTable.codes`, of an alarm or of a verdict.
     """
 
     name: str

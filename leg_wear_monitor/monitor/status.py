@@ -22,14 +22,14 @@ from leg_wear_monitor.monitor.alarms import (
 )
 from leg_wear_monitor.monitor.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.forecast.forecast import UNKNOWN, answer_words, lifetime_values
-from leg_wear_monitor.monitor.input_health import InputHealth
-from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.input_health import InputFault, kind_of
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.reports import Status, VerdictReport
 from leg_wear_monitor.monitor.verdict.situation import SOURCES, KnownClearance
 from leg_wear_monitor.monitor.verdict.verdict import (
     estimate,
     level_of,
+    rules,
     with_unit,
 )
 from leg_wear_monitor.state import JointClearance, Level, State, Verdict
@@ -41,6 +41,10 @@ from leg_wear_monitor.twin.statistics import Tracking
 
 _INPUT = tuple(spec.name() for spec in alarm_specs.OF_INPUT)
 """Names of the alarms of the input."""
+_OF_CYCLE = (
+    "growth_m_per_cycle", "growth_mps", "peak_force_n", "p99_force_n", "mean_force_n", "impacts",
+)  # fmt: skip
+"""Values of a joint in a gait cycle."""
 
 
 def statuses(leg: MonitoredLeg, report: VerdictReport) -> tuple[Status, ...]:
@@ -52,17 +56,14 @@ def statuses(leg: MonitoredLeg, report: VerdictReport) -> tuple[Status, ...]:
     report : VerdictReport
         The verdict now, with the state of the leg.
     """
-    clearances = report.state.clearances
-    joints = []
-    for k, name in enumerate(leg.clearance_joints):
-        joint = _with_measured(_joint(leg, k, name), leg.measured[k])
-        joints.append(_as_judged(joint, clearances[name], [f for f in report.findings if name in f.joints]))
+    clearances, names = report.state.clearances, leg.clearance_joints
+    findings = [[one for one in report.findings if name in one.joints] for name in names]
     return (
         verdict_status(report.verdict),
         _gait(leg),
         _input(leg),
         *(status for each in leg.observers for status in each.statuses),
-        *joints,
+        *(_joint(leg, k, clearances[name], findings[k]) for k, name in enumerate(names)),
         alarms_status(leg.evaluation.board.alarms.values()),
         _ledger(leg.accounting),
     )
@@ -110,8 +111,11 @@ def _input(leg: MonitoredLeg) -> Status:
     faulty, used = counts.pop("faulty"), counts.pop("used")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
-    values = _health_values(evaluation.health) if evaluation.health else {}
-    values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
+    values = (
+        evaluation.health
+        | {"received": counts.pop("received")}
+        | {f"{name}_used": count for name, count in used.items()}
+    )
     # the other counters of the intake by their names, such as duplicates and gaps_lost
     values |= counts | {"already_counted": leg.accounting.skipped}
     values |= {name: getattr(guard, name) for name in ("conflicting", "implausible", "torque_outliers")}
@@ -119,15 +123,20 @@ def _input(leg: MonitoredLeg) -> Status:
     level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
     faults = leg.judge.faults
-    sentences = [one.sentence for one in faults]
-    messages = [*sentences, *evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
+    messages = [*map(_sentence, faults), *evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
     if faults:
-        is_blind = any(one.rule.kind == CRANK for one in faults)
+        is_blind = any(kind_of(one.code) == CRANK for one in faults)
         level, code = max(level, Level.ERROR if is_blind else Level.WARN), faults[0].code
     if guard.cause:
         level, code = Level.ERROR, TRACKING_LOST
     return Status("input", level, message, {name: float(value) for name, value in values.items()}, code)
+
+
+def _sentence(fault: InputFault) -> str:
+    """A fault of the input, and the remedy."""
+    rule = rules()[fault.code]
+    return f"{rule.why}. {rule.do[0].upper()}{rule.do[1:]}".format(**fault.texts)
 
 
 def _code(evaluation: AlarmEvaluation, names: Iterable[str]) -> str:
@@ -135,85 +144,46 @@ def _code(evaluation: AlarmEvaluation, names: Iterable[str]) -> str:
     return worst_code(evaluation.board.alarms[name] for name in names)
 
 
-def _health_values(health: InputHealth) -> dict[str, float]:
-    """Rates, gaps and times of the input's evaluation period, a value each."""
-    values = attrs.asdict(health)
-    rates = {f"{name}_rate_hz": rate for name, rate in values.pop("rate_hz").items()}
-    return {"duration_s": values.pop("duration_s"), **rates, **values}
-
-
-def _joint(leg: MonitoredLeg, k: int, name: str) -> Status:
-    """Modelled clearance, growth, forces and forecast of clearance joint k, with the level of its alarms."""
-    twin, evaluation, last = leg.twin, leg.evaluation, leg.last
-    names = [spec.name(name) for spec in alarm_specs.JOINT]
-    level, code = evaluation.board.level(*names), _code(evaluation, names)
-    values = {
-        "clearance_m": float(twin.clearance_mean_m[k]),
-        "clearance_max_m": float(twin.clearance_max_m[k]),
-        "clearance_limit_m": evaluation.board.clearance_limits_m[k],
-    }
-    report = last.joints[k] if last else None
-    if report is None:
-        return Status(f"joint {name}", level, "no whole gait cycle yet", values, code)
-    values |= {
-        "growth_m_per_cycle": or_nan(report.growth_m_per_cycle),
-        "growth_mps": or_nan(report.growth_mps),
-        "peak_force_n": report.peak_force_n,
-        "p99_force_n": report.p99_force_n,
-        "mean_force_n": report.mean_force_n,
-        "impacts": float(report.impacts),
-        **(_load_values(report.load) if report.load else {}),
-    }
-    if report.forecast is None:
-        return Status(f"joint {name}", level, "no forecast yet", values, code)
-    values |= UNKNOWN | lifetime_values(report.forecast)
-    if report.forecast.prior is not None:
-        values["wear_coefficient_sigma"] = report.forecast.prior.sigma
-    return Status(f"joint {name}", level, answer_words(report.forecast), values, code)
-
-
-def _with_measured(joint: Status, measured: Measurement | None) -> Status:
-    """A joint's status with its measured clearance next to the modelled clearance."""
-    if measured is None:
-        return joint
-    words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
-    if not measured.counts:
-        words += " (contradicts the model, so the forecast does not use it)"
-    words += f", {amount(joint.values['clearance_m'], 'm')} is modelled"
-    values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
-    return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
-
-
-def _as_judged(joint: Status, known: JointClearance, findings: Sequence[Verdict]) -> Status:
-    """Status of a joint, with its best estimate of the clearance and the findings of the verdict."""
-    values, message = joint.values, joint.message
+def _joint(leg: MonitoredLeg, k: int, known: JointClearance, findings: Sequence[Verdict]) -> Status:
+    """Clearance, growth, forces and forecast of joint k, with its worst alarm or the worst finding on it."""
+    joint, board, measured = leg.clearance_joints[k], leg.evaluation.board, leg.measured[k]
+    report = leg.last.joints[k] if leg.last else None
+    forecast = report.forecast if report else None
+    names = [spec.name(joint) for spec in alarm_specs.JOINT]
+    level, code = board.level(*names), _code(leg.evaluation, names)
+    values, words = dict[str, float](), list[str]()
     if known.best_estimate_m is not None:
-        values = {
-            "best_estimate_m": known.best_estimate_m,
-            f"best_estimate_source_{known.best_estimate_source}": 1.0,
-            **values,
-        }
-        if known.best_estimate_sigma_m is not None:
-            values["best_estimate_sigma_m"] = known.best_estimate_sigma_m
-        message = f"{_best_estimate(known)}; {message}"
-    joint = attrs.evolve(joint, values=values, message=message)
-    if not findings:
-        return joint
-    # a finding must be worse than the joint's own alarms; an equal finding must ask to inspect or stop
-    worst = max(findings, key=lambda finding: finding.state.severity)
-    level, is_grave = level_of(worst), worst.state in (State.INSPECT, State.STOP)
-    if level < joint.level or (level is joint.level and not is_grave):
-        return joint
-    message = f"{worst.state.words}: {message}"
-    return attrs.evolve(joint, level=level, fault_code=worst.fault_code, message=message)
-
-
-def _best_estimate(one: JointClearance) -> str:
-    """The best estimate, such as ``1.66 mm ± 0.4 mm according to the drive torque``; empty if none."""
-    if one.best_estimate_m is None or one.best_estimate_source is None:
-        return ""
-    known = KnownClearance(one.best_estimate_source, one.best_estimate_m, or_nan(one.best_estimate_sigma_m))
-    return f"{known.words} according to {SOURCES[known.by]}"
+        by, sigma_m = known.best_estimate_source or "", or_nan(known.best_estimate_sigma_m)
+        values |= {"best_estimate_m": known.best_estimate_m, f"best_estimate_source_{by}": 1.0}
+        if not math.isnan(sigma_m):
+            values["best_estimate_sigma_m"] = sigma_m
+        words.append(f"{KnownClearance(by, known.best_estimate_m, sigma_m).words} according to {SOURCES[by]}")
+    values |= {
+        "clearance_m": known.modelled_m,
+        "clearance_max_m": float(leg.twin.clearance_max_m[k]),
+        "clearance_limit_m": known.limit_m,
+    }
+    if report:
+        values |= {name: float(or_nan(getattr(report, name))) for name in _OF_CYCLE}
+        values |= _load_values(report.load) if report.load else {}
+    if forecast:
+        values |= UNKNOWN | lifetime_values(forecast)
+        if forecast.prior:
+            values["wear_coefficient_sigma"] = forecast.prior.sigma
+        words.append(answer_words(forecast))
+    else:
+        words.append("no forecast yet" if report else "no whole gait cycle yet")
+    if measured:
+        values |= {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
+        unused = "" if measured.counts else " (contradicts the model, so the forecast does not use it)"
+        size = estimate(measured.clearance_m, measured.sigma_m, "m")
+        words.append(f"{size} was measured{unused}, {amount(known.modelled_m, 'm')} is modelled")
+    worst = max(findings, key=lambda finding: finding.state.severity, default=None)
+    # a finding counts that is worse than the joint's own alarms; of equals, one that asks to inspect or stop
+    if worst and (level_of(worst), worst.state in (State.INSPECT, State.STOP)) > (level, False):
+        level, code = level_of(worst), worst.fault_code
+        words[0] = f"{worst.state.words}: {words[0]}"
+    return Status(f"joint {joint}", level, "; ".join(words), values, code)
 
 
 def _load_values(load: BushingLoad) -> dict[str, float]:

@@ -9,29 +9,31 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.gross_causes import Allowed, explanation
 from leg_wear_monitor.estimate.least_squares import DATA_ERRORS
 from leg_wear_monitor.files import or_nan
-from leg_wear_monitor.monitor.alarm_specs import MISMATCH, TORQUE
-from leg_wear_monitor.monitor.alarms import WARN_FRACTION
-from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.alarm_specs import MISMATCH, QUANTITIES, TORQUE
+from leg_wear_monitor.monitor.alarms import CAUSES_OF_ALARMS, DIAGNOSIS, WARN_FRACTION, worst_code
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
-from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisState, NotUsed, TorqueState
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import (
     MismatchWindow,
     TorqueRecord,
+    offset_error_rad,
     torque_causes,
     torque_values,
 )
 from leg_wear_monitor.monitor.ledger.entry import SimulatedReference
 from leg_wear_monitor.monitor.observer import Observer
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
+from leg_wear_monitor.monitor.verdict.rules import explanation as explanation_words
+from leg_wear_monitor.monitor.verdict.rules import sentence
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
-from leg_wear_monitor.monitor.verdict.verdict import estimate
+from leg_wear_monitor.monitor.verdict.verdict import estimate, with_unit, words_of_cause
 from leg_wear_monitor.monitor.wear_model import WearModel
 from leg_wear_monitor.state import Drive, Estimate, Level, TorqueDiagnosis
 from leg_wear_monitor.twin.reference import LegParameters
@@ -45,6 +47,13 @@ WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated, so clearances grow too fast to be estimated"
 _CONTRADICTS = 3.0  # standard deviations between the torque estimate and a measurement by an operator
 _FACTORS = (Cause.SCALE, Cause.SIGN)
+_TORQUE = tuple(spec.name() for spec in TORQUE)
+_SAME_NAMES = (
+    "load_n", "load_sigma_n", "load_acting_n", "friction_nm", "friction_sigma_nm", "torque_lag_s",
+    "torque_lag_sigma_s", "load_friction", "load_friction_sigma",
+)  # fmt: skip
+"""Values of a gait cycle that the status `torque` shows under their own names."""
+_CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.items()}
 
 
 class TorqueWatch(Observer):
@@ -311,7 +320,7 @@ class TorqueWatch(Observer):
         """Which torque a leg without a fault may have."""
         config = self._leg.config
         return Allowed(
-            lag_s=largest_lag_s(config),
+            lag_s=config.drive.largest_lag_s,
             loads_n=LOADS_N,
             friction_nm=self._leg.twin.max_friction_nm,
             unexplained=WARN_FRACTION * config.limits.torque_mismatch,
@@ -321,8 +330,7 @@ class TorqueWatch(Observer):
     def causes(self) -> dict[str, NamedCause]:
         """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
         alarms, last = self._board.alarms, self._leg.last
-        names = {spec.name() for spec in TORQUE}
-        present = {name for name in names if alarms[name].present is not Level.OK}
+        present = {name for name in _TORQUE if alarms[name].present is not Level.OK}
         return torque_causes(present, last, self.record, self._leg.twin.max_friction_nm) if last else {}
 
     @property
@@ -372,11 +380,121 @@ class TorqueWatch(Observer):
 
     @property
     def statuses(self) -> Sequence[Status]:
-        """Comparison of measured and predicted torque, and clearance estimates from the torque."""
-        diagnosis, causes = self.diagnosis, None if self.is_wrong else self.causes
-        torque = torque_status(self._board, self._leg.last, self.record, self.explained, causes, diagnosis)
-        return torque, diagnosis_status(self._leg.clearance_joints, diagnosis)
+        """Comparison of measured and predicted torque, and clearances by the torque."""
+        diagnosis = self.diagnosis
+        return self._torque_status(diagnosis), self._diagnosis_status(diagnosis)
+
+    def _torque_status(self, diagnosis: Diagnosis) -> Status:
+        """Comparison of measured and predicted torque, and the explanation of a torque residual."""
+        alarms, last, explained = self._board.alarms, self._leg.last, self.explained
+        causes = None if self.is_wrong else self.causes
+        level, code = self._board.level(*_TORQUE), worst_code(alarms[name] for name in _TORQUE)
+        code = _CODES.get(code, code)
+        if last is None or not last.torque_samples:
+            return Status("torque", level, "not compared: no drive torque in the last gait cycle", {}, code)
+        values = {
+            "measured_rms_nm": last.measured_torque_rms_nm,
+            "predicted_rms_nm": last.predicted_torque_rms_nm,
+            "residual_rms_nm": last.residual_torque_rms_nm,
+            "mismatch": last.torque_mismatch,
+            "samples": float(last.torque_samples),
+            "friction_commissioned_nm": self.record.commissioned.value,
+            "crank_offset_error_rad": offset_error_rad(last),
+            **{name: getattr(last, name) for name in _SAME_NAMES},
+        }
+        for why in NotCompared:
+            values[f"not_compared_{why.value}_cycles"] = float(self.record.not_compared[why.value])
+        raised = {name for name in _TORQUE if alarms[name].level is not Level.OK}
+        messages = []
+        if MISMATCH.name() in raised:
+            by = f": {explanation_words(explained, diagnosis)}" if explained else ""
+            messages = [f"the measured torque differs from the prediction{by}"]
+            values |= _explained_values(explained) if explained else {}
+            code = explained.named[0].cause.fault_code if explained and explained.named else code
+        if causes is not None:  # those are estimates for the torque as received
+            messages += [sentence(one, diagnosis) for one in causes.values()]
+            past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in causes]
+            messages += [f"the {QUANTITIES[name]} was beyond its limit" for name in past]
+        if not messages and math.isnan(last.torque_mismatch):
+            messages = ["not enough gait cycles for a comparison yet"]
+        return Status(
+            "torque",
+            level,
+            "; ".join(messages or ["the measured torque agrees with the prediction"]),
+            values,
+            code,
+        )
+
+    def _diagnosis_status(self, diagnosis: Diagnosis) -> Status:
+        """Clearances from the drive torque; NaN for joints that are not observable."""
+        values = {"cycles": float(diagnosis.cycles)}
+        for reason in NotUsed:
+            values[f"not_used_{reason.value}"] = float(diagnosis.cycles_not_used.get(reason.value, 0))
+        for k, joint in enumerate(self._leg.clearance_joints):
+            unknown = (math.nan, math.nan)
+            values[f"{joint}_clearance_m"], values[f"{joint}_sigma_m"] = diagnosis.of_joint(k) or unknown
+            change = diagnosis.change_of_joint(k) or unknown
+            values[f"{joint}_change_m"], values[f"{joint}_change_sigma_m"] = change
+        for body in diagnosis.bodies:
+            values[f"{body.name}_mass_factor"] = body.mass
+            values[f"{body.name}_length_factor"] = body.length
+        if diagnosis.bodies:
+            values["joint_friction_factor"] = diagnosis.friction
+        if diagnosis.channel != DIRECT:
+            values["drive_delay_s"] = diagnosis.channel.delay_s
+            values["drive_low_pass_s"] = diagnosis.channel.time_constant_s
+            values["drive_load_friction"] = diagnosis.channel.load_friction
+        if diagnosis.load:
+            values["foot_load_peak_n"] = or_nan(diagnosis.load.peak_n)
+            values["foot_load_sigma_n"] = or_nan(diagnosis.load.peak_sigma_n)
+            values["heel_strike_phase"] = or_nan(diagnosis.load.heel_strike_phase)
+            values["toe_off_phase"] = or_nan(diagnosis.load.toe_off_phase)
+        if diagnosis.temperature_c is not None:
+            values["drive_temperature_c"] = diagnosis.temperature_c
+        if diagnosis.compliance:
+            values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance
+        words = _diagnosis_words(diagnosis, self._leg.clearance_joints)
+        if diagnosis.state is DiagnosisState.CHANGED:
+            return Status("diagnosis", Level.WARN, words, values, DIAGNOSIS)
+        return Status("diagnosis", Level.OK, words, values)
 
 
 def _estimate(value: float, sigma: float) -> Estimate | None:
     return Estimate(value=value, sigma=sigma) if math.isfinite(value) else None
+
+
+def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
+    """Values of the first explanation of a torque residual, and the remaining residual."""
+    values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
+    for one in explained.alternatives[0] if explained.alternatives else ():
+        row = words_of_cause(one.cause)
+        name = f"{row.name}_{one.subject}".rstrip("_")
+        values |= {with_unit(name, row.unit): one.value, with_unit(f"{name}_sigma", row.unit): one.sigma}
+    return values
+
+
+# State of the diagnosis in words, without the values that change in each gait cycle.
+
+
+_STATES = {
+    DiagnosisState.OFF: "off",
+    DiagnosisState.WAITING: "waiting",
+    DiagnosisState.AS_MODELLED: "the drive torque agrees with the modelled clearances",
+    DiagnosisState.CHANGED: "the drive torque indicates a change",
+}
+
+
+def _diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
+    """State, reason, and the joints (k,) that the drive torque does not show."""
+    sentences = [_STATES[diagnosis.state]]
+    if diagnosis.reason:
+        sentences.append(diagnosis.reason)
+    if diagnosis.next_step:
+        sentences.append(diagnosis.next_step)
+    sizes = zip(joints, diagnosis.clearance_m, strict=False)  # no sizes without estimates
+    hidden = [joint for joint, size in sizes if math.isnan(size)]
+    if hidden:
+        sentences.append(f"not observable: {', '.join(hidden)}")
+    if diagnosis.bodies:
+        sentences.append("the model uses the masses, lengths and friction identified from the drive torque")
+    return "; ".join(sentences)

@@ -15,8 +15,9 @@ from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, Forecaster, JointForecast
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, ModelError, growth_rate, model_error
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, ModelError, growth_rate, model_error
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
@@ -42,7 +43,6 @@ class WearModel:
         With the clearance joints and clearances of the configuration.
     config : MonitorConfig
         Replaced when parameters change.
-    growth : tuple of GrowthWindow
     last : CycleReport or None
         The last gait cycle of this run.
     """
@@ -61,7 +61,6 @@ class WearModel:
             self.accounting.replaced_ns,
             ledger.corrections if ledger else (),
         )
-        self.growth = tuple(GrowthWindow() for _ in self.clearance_joints)
         self.last: CycleReport | None = None
         self._error: tuple[LegParameters, ModelError] | None = None
         self.new_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
@@ -89,11 +88,6 @@ class WearModel:
             for known, new_m in zip(self.measured, self.new_m, strict=True)
         )
 
-    def grows_anew(self, joints: Sequence[str]) -> None:
-        """Discard the growth of some joints, because it belongs to a different leg."""
-        each = zip(self.clearance_joints, self.growth, strict=True)
-        self.growth = tuple(GrowthWindow() if name in joints else window for name, window in each)
-
     @property
     def measured(self) -> tuple[Measurement | None, ...]:
         """Last measured clearance of each joint's present part."""
@@ -116,14 +110,12 @@ class WearModel:
         self.accounting.note(Audit(stamp_ns, "diagnosis", "correct_clearance", was))
         self.accounting.note(corrected)
         self.forecaster.corrected(corrected)
-        self.grows_anew([joint])
 
     def take_parameters(self, found: LegParameters) -> None:
         """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""
         self.twin.set_parameters(found)
         stamp_ns = self.twin.intake.followed_stamp_ns
         self.accounting.note(IdentifiedLeg(stamp_ns, tuple(self.mechanism.bodies), found))
-        self.grows_anew(self.clearance_joints)
 
     def report(
         self,
@@ -171,7 +163,7 @@ class WearModel:
         seen: ClearanceEstimate | None,
         estimate: KnownClearance | None,
     ) -> JointReport:
-        joint, rate = self.clearance_joints[k], growth_rate(self.growth[k])
+        joint, rate = self.clearance_joints[k], growth_rate(self.forecaster.growth[k].last(GROWTH_CYCLES))
         mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
         rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
         error_m = rate.error_m(self.model_error.relative(k, rate.per_cycle_m)) if rate else None

@@ -16,8 +16,6 @@ from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis
 from leg_wear_monitor.monitor.evaluation import EvaluationPeriods
-from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, all_extended
-from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast.wear_coefficients import coefficient_doubts
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -30,15 +28,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
-from leg_wear_monitor.monitor.operator_actions import (
-    Cleared,
-    acknowledge,
-    measure,
-    renew_forecast,
-    reset_wear,
-    undo_reset,
-    withdraw,
-)
+from leg_wear_monitor.monitor.operator_actions import OperatorActions
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -56,7 +46,7 @@ from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
 
-class WearMonitor:
+class WearMonitor(OperatorActions):
     """Monitors the joint wear of a leg from its crank's motion and its drive torque.
 
     It advises: the absence of an alarm does not mean the joints are healthy.
@@ -203,7 +193,6 @@ class WearMonitor:
             statistics = statistics.without_torque
         # Observers: estimates of this gait cycle.
         self._accounting.ended(statistics)
-        leg.growth = all_extended(leg.growth, statistics, GROWTH_CYCLES)
         for observer in leg.observers:
             observer.end_cycle(statistics, bool(refused))
         # Report, with growth, estimates and forecast.
@@ -389,16 +378,6 @@ class WearMonitor:
         for observer in self._leg.observers:
             observer.configure(config)
 
-    def acknowledge(self, stamp_ns: int) -> Cleared:
-        """Acknowledge all alarms, and the interruption of the previous run.
-
-        Returns
-        -------
-        cleared, kept : tuple of Alarm
-            Alarms that had returned to normal, and alarms that stay until they do.
-        """
-        return acknowledge(self._leg, int(stamp_ns))
-
     def note_alarms(self, stamp_ns: int, alarms: Iterable[Alarm]) -> None:
         """Store changed alarms that are not of this monitor in the ledger, such as those of its node."""
         own = {alarm.name for alarm in self.alarms.alarms}
@@ -407,91 +386,6 @@ class WearMonitor:
             self._accounting.note(event)
         if changed:
             self._leg.keep()
-
-    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Cleared:
-        """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
-
-        Alarms of the former part are acknowledged and clear.
-
-        Returns
-        -------
-        cleared, kept : tuple of Alarm
-            Alarms that cleared, and alarms that are still raised.
-
-        Raises
-        ------
-        LegWearError
-            For a joint without clearance.
-        """
-        return reset_wear(self._leg, joint, int(stamp_ns), who)
-
-    def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
-        """Undo the last `reset_wear` of a joint whose part was not replaced.
-
-        Returns
-        -------
-        JointWear
-            Sum of the wear before the reset and since.
-
-        Raises
-        ------
-        LegWearError
-            For a joint without clearance, or if the ledger has no reset to undo.
-        """
-        return undo_reset(self._leg, joint, int(stamp_ns), who)
-
-    def measure(
-        self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
-    ) -> MeasurementResult:
-        """Add a measured clearance to the ledger; forecast, alarms and verdict follow at once.
-
-        The modelled clearance stays as it is.
-
-        Parameters
-        ----------
-        joint : str
-            Its name or its label.
-        clearance_m, sigma_m : float
-            Mean radial clearance, and its standard deviation.
-        stamp_ns : int
-        who : str
-        accept : bool
-            True if the measurement counts even if it contradicts the model.
-
-        Raises
-        ------
-        LegWearError
-            For a joint without clearance, or impossible values.
-        """
-        return measure(self._leg, joint, float(clearance_m), float(sigma_m), int(stamp_ns), who, accept)
-
-    def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
-        """Withdraw a measurement: it stays in the ledger unused, and a stop that it ended returns.
-
-        Parameters
-        ----------
-        measurement : int
-            Its `id`.
-        stamp_ns : int
-            Not 0.
-        who : str
-
-        Raises
-        ------
-        LegWearError
-            If the ledger has no such measurement, or it is withdrawn already.
-        """
-        return withdraw(self._leg, measurement, int(stamp_ns), who)
-
-    def renew_forecast(self) -> CycleReport | None:
-        """Renew the forecast now; otherwise it may be a minute old.
-
-        Returns
-        -------
-        CycleReport or None
-            The last gait cycle with the new forecast; None before the first.
-        """
-        return renew_forecast(self._leg)
 
     def save(self) -> None:
         """Write an entry into the ledger now.

@@ -9,7 +9,8 @@ import attrs
 
 from leg_wear_monitor.monitor import alarm_specs, alarms
 from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
-from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, acknowledged, evaluated, has_changed
+from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, has_changed
+from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.inputs import Inbox, InputTopic, refusals, several
 from leg_wear_monitor.ros.outputs import BlackBox
@@ -137,7 +138,7 @@ def sources_alarm(kind: str) -> Alarm:
     return Alarm(kind=SOURCES, subject="" if kind == _CRANK else kind)
 
 
-class NodeAlarms:
+class NodeAlarms(AlarmBoard):
     """Alarms of the node, in addition to the monitor's alarms.
 
     The list of alarms contains them only while they are raised; otherwise live runs and replays publish the
@@ -152,30 +153,17 @@ class NodeAlarms:
     def __init__(self, kinds: tuple[str, ...]) -> None:
         alarms = [Alarm(kind=each, subject=kind, unit="s") for each in (SILENCE, AHEAD) for kind in kinds]
         alarms += [sources_alarm(kind) for kind in kinds]
-        self._alarms = {alarm.name: alarm for alarm in alarms}
+        super().__init__(alarms, {alarm.name: _LIMITS[alarm.kind] for alarm in alarms})
 
-    def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> tuple[Alarm, ...]:
+    def changed(self, values: Mapping[str, float], stamp_ns: int) -> tuple[Alarm, ...]:
         """Evaluate values by alarm name; return the alarms whose published state has changed."""
-        changed = []
-        for name, value in values.items():
-            before = self._alarms[name]
-            after = evaluated(before, value, _LIMITS[before.kind], stamp_ns)
-            if has_changed(before, after):
-                changed.append(after)
-            self._alarms[name] = after
-        return tuple(changed)
-
-    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all raised alarms; return the cleared ones and the remaining ones."""
-        now = [acknowledged(alarm) for alarm in self.raised]
-        self._alarms |= {alarm.name: alarm for alarm in now}
-        cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
-        return cleared, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+        before, _ = self.alarms, self.evaluate(values, stamp_ns)
+        return tuple(alarm for name, alarm in self.alarms.items() if has_changed(before[name], alarm))
 
     @property
     def raised(self) -> tuple[Alarm, ...]:
         """Alarms that are published."""
-        return tuple(alarm for alarm in self._alarms.values() if alarm.level is not Level.OK)
+        return tuple(alarm for alarm in self.alarms.values() if alarm.level is not Level.OK)
 
     def beside(self, alarms: AlarmList) -> AlarmList:
         """Merge the monitor's alarms with the node's alarms."""

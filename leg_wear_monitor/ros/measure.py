@@ -19,7 +19,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import ConfigError, LegWearError, did_you_mean, printable
-from leg_wear_monitor.monitor.forecast.measurement import NOT_STORED, with_codes
+from leg_wear_monitor.monitor.forecast.forecaster import NOT_STORED, with_codes
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 # Service ``~/measure``: the operator enters a measured clearance while the monitor runs.

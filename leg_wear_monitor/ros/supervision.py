@@ -230,7 +230,7 @@ class Supervision:
             values[f"{AHEAD} {kind}"] = self._ahead_s[kind]
         self._most_ahead_s = max(self._ahead_s.values())
         self._ahead_s = dict.fromkeys(self._ahead_s, 0.0)
-        changed = self._alarms.evaluate(values, stamp_ns)
+        changed = self._alarms.changed(values, stamp_ns)
         self._monitor.note_alarms(stamp_ns, changed)
         return bool(changed) or axis != self._other_axis
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.alarm_specs import KINDS
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.measurement import with_codes
+from leg_wear_monitor.monitor.forecast.forecaster import with_codes
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Entry, JointWear
 from leg_wear_monitor.monitor.monitored_leg import MonitoredLeg
 from leg_wear_monitor.monitor.operator_actions import note_verdict

@@ -17,7 +17,7 @@ import pytest
 from leg_wear_monitor.fleet import description
 from leg_wear_monitor.mechanism import materials, spec
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.alarms import FAULT_CODES, guide_of
+from leg_wear_monitor.monitor.alarms import guide_of
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
 from leg_wear_monitor.monitor.ledger.file import FORMAT, TABLES, create_tables
 from leg_wear_monitor.monitor.verdict.verdict import rules
@@ -239,7 +239,7 @@ def meanings() -> Iterator[tuple[str, str]]:
             continue
         name = alarm.name("<joint>") if alarm in OF_A_JOINT else alarm.name()
         yield code, f"- Alarm `{name}`: [value and limit](monitor.md#alarms)."
-    for code, meaning in FAULT_CODES.items():
+    for code, meaning in verdict_table().codes.items():
         yield code, f"- Status: {meaning}."
 
 

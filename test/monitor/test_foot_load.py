@@ -14,8 +14,8 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
-from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS
 from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.verdict.verdict import rules
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import LOAD, TORQUE
 from leg_wear_monitor.twin.sample import Samples
@@ -114,9 +114,9 @@ def test_each_fault_of_the_sensor_is_named(walk, change, alarm):
     monitor = monitored(changed(change, walk))
     assert of_foot_load(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
     found = {finding.fault_code: finding for finding in monitor.verdict.findings}
-    assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
+    assert rules()[alarm.upper()].fault in found[alarm.upper()].why
     status = status_of(monitor, "foot_load")
-    assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
+    assert status.level is Level.ERROR and rules()[alarm.upper()].fault in status.message
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.001, 1 / 785, 100.0])

@@ -122,7 +122,7 @@ def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
 
 def _answered(reply: str) -> int:
     """Print the reply of a running monitor, and return the exit code."""
-    from leg_wear_monitor.monitor.forecast.measurement import has_codes
+    from leg_wear_monitor.monitor.forecast.forecaster import has_codes
 
     click.echo(reply)
     return common.WITH_FINDINGS if has_codes(reply) else 0

@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.loader import limit_fault
 from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism, SpeedDrive
-from leg_wear_monitor.monitor.config.inputs import INTERFACE, MAX_LAG_S
+from leg_wear_monitor.monitor.config.inputs import INTERFACE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
 from leg_wear_monitor.twin import sample
 
@@ -110,11 +110,6 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> sample.T
         load_frame=config.foot_load.frame,
         load_model=config.load.model,
     )
-
-
-def largest_lag_s(config: MonitorConfig) -> float:
-    """Largest lag that a torque may have: the declared lag of the drive, and `MAX_LAG_S`."""
-    return MAX_LAG_S + drive_figures(config.drive).lateness_s
 
 
 def _check_joints(clearance_joints: Sequence[str], mechanism: Mechanism, source: str) -> None:

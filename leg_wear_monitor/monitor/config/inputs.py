@@ -75,7 +75,8 @@ class Crank:
             raise FieldError("offset_rad", fault)
 
 
-def _named(name: str) -> str | None:
+def filled(name: str) -> str | None:
+    """The fault of an empty name; None if it is not empty."""
     return None if name else "'' is empty. Expected a name"
 
 
@@ -138,7 +139,7 @@ class DriveTorque:
         "name of the crank's interface if drive_torque.source is interface, such as motor_current; the unit "
         "of drive_torque.scale is then N m per ampere",
         default="effort",
-        check=_named,
+        check=filled,
     )
     sampling: str = choice(
         sample.SAMPLINGS,

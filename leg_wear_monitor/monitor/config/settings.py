@@ -13,12 +13,14 @@ from leg_wear_monitor.mechanism.materials import LIBRARY, Drive, load_drive
 from leg_wear_monitor.mechanism.spec import USUAL_WEAR, WEAR_SLIP
 from leg_wear_monitor.monitor.config.inputs import (
     LIVE,
+    MAX_LAG_S,
     Cadence,
     Crank,
     DriveTorque,
     Encoders,
     FootLoad,
     Load,
+    filled,
     live_quantity,
 )
 from leg_wear_monitor.monitor.config.tables import TableInput
@@ -79,6 +81,11 @@ class DriveParameters:
         "drive_torque.source interface; empty for none",
         default="",
     )
+
+    @property
+    def largest_lag_s(self) -> float:
+        """Largest lag that a torque may have: the declared lag of the drive, and `MAX_LAG_S`."""
+        return MAX_LAG_S + drive_figures(self).lateness_s
 
 
 def drive_figures(parameters: DriveParameters, source: str = "parameters") -> DriveFigures:
@@ -145,10 +152,6 @@ class Forecasting:
     )
 
 
-def _filled(text: str) -> str | None:
-    return None if text else "'' is empty. Expected a name"
-
-
 @attrs.frozen(kw_only=True)
 class Limits:
     """Limits of alarms: ERROR at the limit, WARN at a fraction of it."""
@@ -188,6 +191,10 @@ class Limits:
         at_most=100.0,
         default=0.1,
     )
+
+    def of_joint_m(self, k: int) -> float:
+        """Limit of the clearance of joint k [m]: its own if there are limits per joint, or the common one."""
+        return self.joint_clearance_m[k] if self.joint_clearance_m else self.clearance_m
 
     def of_clearances(self, joints: int) -> tuple[str, tuple[float, ...]]:
         """The parameter that limits the clearances, and the limit of each of so many clearance joints [m]."""
@@ -251,7 +258,7 @@ class MonitorConfig:
     mechanism: str = described(
         "mechanism of the leg: a name from the package, or a file",
         default="bionic_leg",
-        check=_filled,
+        check=filled,
     )
     hardware_id: str = described(
         "name of this leg in diagnostics and the ledger; if empty, the namespace of the node, or leg",
@@ -281,7 +288,7 @@ class MonitorConfig:
         within=(1.0e-9, 1.0e5),
         default=1.0,
     )
-    crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)
+    crank_joint: str = described("name of the crank in joint_states", default="crank", check=filled)
     crank: Crank = described("", factory=Crank)
     encoders: Encoders = described("", factory=Encoders)
     drive_torque: DriveTorque = described("", factory=DriveTorque)
@@ -304,9 +311,7 @@ class MonitorConfig:
         default=False,
     )
     publish_markers: bool = described("publish markers for RViz and Foxglove", default=False, metadata=LIVE)
-    frame_id: str = described(
-        "frame of the pelvis, for wrenches and markers", default="pelvis", check=_filled
-    )
+    frame_id: str = described("frame of the pelvis, for wrenches and markers", default="pelvis", check=filled)
 
     @property
     def hardware(self) -> str:

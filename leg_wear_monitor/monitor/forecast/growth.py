@@ -19,7 +19,6 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
-from leg_wear_monitor.twin.statistics import CycleStatistics
 
 # Mean growth over gait cycles: single cycles of a chaotic motion scatter.
 
@@ -49,6 +48,16 @@ class GrowthWindow:
     growth_m: Floats = attrs.field(factory=lambda: np.zeros(0))
     moving_s: Floats = attrs.field(factory=lambda: np.zeros(0))
 
+    def last(self, cycles: int) -> "GrowthWindow":
+        """The last ones of these gait cycles."""
+        return GrowthWindow(self.growth_m[-cycles:], self.moving_s[-cycles:])
+
+    def extended(self, growth_m: float, moving_s: float, cycles: int) -> "GrowthWindow":
+        """Window of at most so many cycles with one more."""
+        return GrowthWindow(np.append(self.growth_m, growth_m), np.append(self.moving_s, moving_s)).last(
+            cycles
+        )
+
 
 @attrs.frozen
 class GrowthRate:
@@ -77,22 +86,6 @@ class GrowthRate:
             Standard deviation of the relative growth (`ModelError`).
         """
         return math.hypot(self.sampling_m, model_error * self.per_cycle_m)
-
-
-def extended(window: GrowthWindow, growth_m: float, moving_s: float, cycles: int) -> GrowthWindow:
-    """Window of at most so many cycles with one more."""
-    keep = max(0, len(window.growth_m) + 1 - cycles)
-    return GrowthWindow(
-        np.append(window.growth_m[keep:], growth_m), np.append(window.moving_s[keep:], moving_s)
-    )
-
-
-def all_extended(
-    windows: Sequence[GrowthWindow], statistics: CycleStatistics, cycles: int
-) -> tuple[GrowthWindow, ...]:
-    """Windows of all joints, with one more gait cycle."""
-    each = zip(windows, statistics.growth_mean_m.tolist(), strict=True)
-    return tuple(extended(window, growth_m, statistics.moving_s, cycles) for window, growth_m in each)
 
 
 def growth_rate(window: GrowthWindow) -> GrowthRate | None:

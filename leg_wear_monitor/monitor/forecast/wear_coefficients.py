@@ -154,11 +154,6 @@ def known_clearances(
     ]
 
 
-def corrections_of(corrections: Sequence[Recount], joint: str, replaced_ns: int) -> list[Recount]:
-    """Corrections of one part of a joint."""
-    return [c for c in corrections if c.joint == joint and c.replaced_ns == replaced_ns]
-
-
 GRID = 801
 _WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
 _DEEP = 25.0  # log density below the highest: the neglected part weighs less than 1e-9

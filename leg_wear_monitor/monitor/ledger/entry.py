@@ -11,7 +11,7 @@ import numpy as np
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.alarms import Alarm, duration
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.reference import LegParameters
@@ -52,45 +52,23 @@ def _plain(value: Any) -> Any:
     return value
 
 
-@attrs.frozen(kw_only=True)
-class Binding:
-    """Properties that must be equal for a ledger to be continued.
+def binding_of(mechanism: Mechanism, config: MonitorConfig) -> dict[str, str]:
+    """Properties of a leg that must be equal for a ledger to be continued, as the ledger keeps them.
 
-    Attributes
+    Parameters
     ----------
-    hardware_id : str
-    mechanism : str
-        Name of the mechanism, for messages.
-    fingerprint : str
-    joints : tuple of str
-        The clearance joints.
-    wear_acceleration : float
-    sectors : int
-        Number of sectors of each surface.
+    mechanism : Mechanism
+        As `fitted` returned it.
+    config : MonitorConfig
     """
-
-    hardware_id: str
-    mechanism: str
-    fingerprint: str
-    joints: tuple[str, ...]
-    wear_acceleration: float = 1.0
-    sectors: int = SECTORS
-
-    def as_texts(self) -> dict[str, str]:
-        """Texts as the ledger keeps them."""
-        texts = {name: str(value) for name, value in attrs.asdict(self).items()}
-        return texts | {"joints": ", ".join(sorted(self.joints))}
-
-
-def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
-    """Binding of a mechanism that `fitted` returned."""
-    return Binding(
-        hardware_id=config.hardware,
-        mechanism=mechanism.name,
-        fingerprint=fingerprint(mechanism),
-        joints=mechanism.clearance_joints,
-        wear_acceleration=config.wear_acceleration,
-    )
+    return {
+        "hardware_id": config.hardware,
+        "mechanism": mechanism.name,  # for messages
+        "fingerprint": fingerprint(mechanism),
+        "joints": ", ".join(sorted(mechanism.clearance_joints)),
+        "wear_acceleration": str(config.wear_acceleration),
+        "sectors": str(SECTORS),
+    }
 
 
 @attrs.frozen
@@ -174,14 +152,7 @@ def walked_words(loads: Iterable[WalkedLoad]) -> str:
     longest = sorted(loads, key=lambda load: -load.moving_s)
     if not any(load.about_n for load in longest):
         return ""
-    return "walked " + ", ".join(f"{_time(load.moving_s)} at {load.mean_n:.0f} N" for load in longest)
-
-
-def _time(seconds: float) -> str:
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
+    return "walked " + ", ".join(f"{duration(load.moving_s)} at {load.mean_n:.0f} N" for load in longest)
 
 
 @attrs.frozen(eq=False)
@@ -446,18 +417,6 @@ def coefficient_spans(
     return tuple(spans)
 
 
-@attrs.frozen
-class ForecastPoint:
-    """A joint's gait cycles to its limit (p10, p50, p90), as forecast after so many gait cycles."""
-
-    stamp_ns: int
-    cycle: int
-    joint: str
-    p10_cycles: float
-    p50_cycles: float
-    p90_cycles: float
-
-
 @attrs.frozen(eq=False)
 class Commissioned:
     """Errors of further encoders, estimated while the clearances were known.
@@ -521,7 +480,6 @@ Event = (
     | ClearancePoint
     | Measurement
     | CorrectedClearance
-    | ForecastPoint
     | Commissioned
     | CommissionedTorque
     | IdentifiedLeg

@@ -8,7 +8,7 @@ import shutil
 import sqlite3
 import tempfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
@@ -25,13 +25,11 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
-    Binding,
     ClearancePoint,
     Commissioned,
     CorrectedClearance,
     Entry,
     Event,
-    ForecastPoint,
     IdentifiedLeg,
     JointWear,
     Measurement,
@@ -54,7 +52,6 @@ TABLES: dict[type[attrs.AttrsInstance], str] = {
     AlarmEvent: "alarm_history",
     Audit: "audit",
     ClearancePoint: "history",
-    ForecastPoint: "forecast",
     Measurement: "measurement",
     CorrectedClearance: "correction",
     VerdictEvent: "verdict",
@@ -299,13 +296,13 @@ class LedgerError(LegWearError):
     """A ledger cannot be used."""
 
 
-def connect(path: Path, binding: Binding) -> sqlite3.Connection:
+def connect(path: Path, binding: Mapping[str, str]) -> sqlite3.Connection:
     """Open or create a ledger, and lock it until the connection is closed.
 
     Parameters
     ----------
     path : pathlib.Path
-    binding : Binding
+    binding : mapping of str to str
         The leg that the ledger must belong to.
 
     Raises
@@ -396,15 +393,15 @@ def copy_of(path: str | Path) -> Iterator[Path]:
             raise LedgerError(str(error).replace(str(copy), str(original))) from error
 
 
-def _create(path: Path, binding: Binding) -> None:
-    """Create a ledger without wear; after an interruption, the path has no ledger or a complete ledger."""
+def _create(path: Path, binding: Mapping[str, str]) -> None:
+    """Create a ledger without wear; even if this is cut off, the path has no ledger or a complete one."""
     new = path.with_name(f"{path.name}.new")
     try:
         new.unlink(missing_ok=True)
         os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, _MODE))
         with closing(_connect(new, "rw")) as db, transaction(db):
             create_tables(db)
-            db.executemany("INSERT INTO binding VALUES (?, ?)", binding.as_texts().items())
+            db.executemany("INSERT INTO binding VALUES (?, ?)", binding.items())
         new.rename(path)
     except (sqlite3.Error, OSError) as error:
         reason = error.strerror if isinstance(error, OSError) else one_line(error)
@@ -428,7 +425,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return db
 
 
-def _lock_and_check(db: sqlite3.Connection, path: Path, binding: Binding) -> None:
+def _lock_and_check(db: sqlite3.Connection, path: Path, binding: Mapping[str, str]) -> None:
     """Lock a file, and check that it is sound, has this version's tables, and is of this leg."""
     with transaction(db):  # the lock outlasts it, see `_connect`
         if _tables(db) != _expected_tables() or db.execute("PRAGMA user_version").fetchone() != (FORMAT,):
@@ -453,10 +450,10 @@ def _expected_tables() -> tuple[tuple[str, str], ...]:
         return _tables(db)
 
 
-def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None:
+def _check_binding(db: sqlite3.Connection, path: Path, binding: Mapping[str, str]) -> None:
     """Refuse the ledger of a different leg, or with other parameters of this leg."""
     found = dict(db.execute("SELECT key, value FROM binding"))
-    for key, ours in binding.as_texts().items():
+    for key, ours in binding.items():
         if found.get(key) != ours:
             what = f"{path}: belongs to {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
             if key == "hardware_id":

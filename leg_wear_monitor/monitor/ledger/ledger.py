@@ -6,10 +6,10 @@ the wear since the last entry is lost: at most the time between two entries, whi
 """
 
 import sqlite3
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import one_line
@@ -20,7 +20,6 @@ from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
-    Binding,
     Commissioned,
     CorrectedClearance,
     Entry,
@@ -52,9 +51,12 @@ from leg_wear_monitor.monitor.ledger.file import (
 from leg_wear_monitor.state import Verdict
 
 
-@attrs.frozen(kw_only=True, eq=False)
 class LedgerContent:
-    """Content of a ledger on its leg.
+    """Content of a ledger on its leg, by earlier runs.
+
+    Parameters
+    ----------
+    db : sqlite3.Connection
 
     Attributes
     ----------
@@ -66,25 +68,34 @@ class LedgerContent:
     measurements : tuple of Measurement
         Manually measured clearances, including withdrawn ones.
     audits : tuple of Audit
+    corrections : tuple of CorrectedClearance and CoefficientSpan
+        Modelled clearances that the drive torque corrected; with `open_ledger`, also wear that was modelled
+        with wear coefficients other than the leg's now.
+    states : tuple of JointWear
+        Parts as they were before each change of their wear, then as in `entry`.
+    commissioned : Commissioned or None
+        Errors of further encoders.
+    commissioned_torques : list of CommissionedTorque
+        Signatures of the drive torque, one for each cadence, the last one first.
+    references : list of SimulatedReference
+        Torque references that were simulated, the last one first; one may not be whole.
+    parameters : IdentifiedLeg or None
+        Masses, lengths and friction that were identified.
     """
 
-    runs: tuple[Run, ...]
-    entry: Entry | None
-    verdict: Verdict | None
-    measurements: tuple[Measurement, ...]
-    audits: tuple[Audit, ...]
-
-    @classmethod
-    def of(cls, db: sqlite3.Connection) -> "LedgerContent":
-        """Read all of it."""
-        runs, verdicts = read(db, Run), read(db, VerdictEvent)
-        return cls(
-            runs=runs,
-            entry=read_entry(db, runs),
-            verdict=verdicts[-1].verdict if verdicts else None,
-            measurements=read(db, Measurement),
-            audits=read(db, Audit),
-        )
+    def __init__(self, db: sqlite3.Connection) -> None:
+        self.runs, verdicts = read(db, Run), read(db, VerdictEvent)
+        self.entry = read_entry(db, self.runs)
+        self.verdict: Verdict | None = verdicts[-1].verdict if verdicts else None
+        self.measurements = read(db, Measurement)
+        self.audits = read(db, Audit)
+        self.corrections: tuple[Recount, ...] = read(db, CorrectedClearance)
+        former = [audit.joint for audit in self.audits if audit.joint]
+        self.states = (*former, *(self.entry.joints if self.entry else ()))
+        self.commissioned = next(reversed(read(db, Commissioned)), None)
+        self.commissioned_torques = commissioned_torques(read(db, CommissionedTorque))
+        self.parameters = next(reversed(read(db, IdentifiedLeg)), None)
+        self.references = [*reversed(read(db, SimulatedReference))]
 
     @property
     def loads(self) -> tuple[WalkedLoad, ...]:
@@ -98,15 +109,15 @@ class LedgerContent:
         return np.array(sorted(spans), dtype=np.int64).reshape(-1, 2)
 
 
-class Ledger:
+class Ledger(LedgerContent):
     """An open ledger, locked for this process.
 
     Parameters
     ----------
     path : pathlib.Path or str
         Created if it does not exist.
-    binding : Binding
-        Leg that its wear must belong to.
+    binding : mapping of str to str
+        Of `binding_of` the leg that its wear must belong to.
     interval_s : float
         Intended longest time between two entries.
     at_end : bool
@@ -114,29 +125,8 @@ class Ledger:
 
     Attributes
     ----------
-    entry : Entry or None
-        Last entry of earlier runs; None in a new ledger.
-    measurements : tuple of Measurement
-        Manually measured clearances of earlier runs, including withdrawn ones.
-    corrections : tuple of CorrectedClearance and CoefficientSpan
-        Modelled clearances that the drive torque corrected in earlier runs; with `open_ledger`, also wear
-        that was modelled with wear coefficients other than the leg's now.
-    states : tuple of JointWear
-        Parts as they were before each change of their wear in earlier runs, then as in `entry`.
-    audits : tuple of Audit
-        Changes of earlier runs and of this one.
-    verdict : Verdict or None
-        Since its last change, in earlier runs and in this one.
-    commissioned : Commissioned or None
-        Errors of further encoders from earlier runs.
-    commissioned_torques : list of CommissionedTorque
-        Signatures of the drive torque from earlier runs, one for each cadence, the last one first.
-    references : list of SimulatedReference
-        Torque references that were simulated in earlier runs, the last one first; one may not be whole.
-    parameters : IdentifiedLeg or None
-        Masses, lengths and friction that were identified in earlier runs.
-    loads : tuple of WalkedLoad
-        Foot loads of earlier runs.
+    audits, verdict
+        With the changes of this run.
     last_run : Run
         The previous run.
     epoch, boot_id : int, str
@@ -145,8 +135,6 @@ class Ledger:
     cut_off_s : float or None
         If a run was interrupted and that is not acknowledged: the longest time of walking whose wear was
         lost.
-    counted_ns : (n, 2) array
-        Begin and end [ns] of the time spans counted in earlier runs, in all epochs.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
     fault : str
@@ -158,7 +146,9 @@ class Ledger:
         If it cannot be read, or must not be continued.
     """
 
-    def __init__(self, path: Path | str, binding: Binding, interval_s: float, at_end: bool = False) -> None:
+    def __init__(
+        self, path: Path | str, binding: Mapping[str, str], interval_s: float, at_end: bool = False
+    ) -> None:
         self.path, self.at_end, self.fault = Path(path), at_end, ""
         self._events: list[Event] = []
         self._db = connect(self.path, binding)
@@ -168,30 +158,17 @@ class Ledger:
         self._loads: tuple[WalkedLoad, ...] = ()
         try:
             with damage_refused(self.path):
-                self._read()
+                super().__init__(self._db)
+            self.last_run = self.runs[-1] if self.runs else Run()
+            self.epoch, self.boot_id = self.last_run.epoch, self.last_run.boot_id
+            self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
+            self.kept_ns = self.entry.stamp_ns if self.entry else 0
+            self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
             if not at_end and not self._write(self._run(closed=False)):
                 raise LedgerError(f"{self.path}: cannot be written: {self.fault}")
         except BaseException:
             self.close()
             raise
-
-    def _read(self) -> None:
-        db, content = self._db, LedgerContent.of(self._db)
-        self.entry, self.measurements = content.entry, content.measurements
-        self.audits, self.verdict = content.audits, content.verdict
-        self.loads, self.counted_ns = content.loads, content.counted_ns
-        self.last_run = content.runs[-1] if content.runs else Run()
-        self.epoch, self.boot_id = self.last_run.epoch, self.last_run.boot_id
-        self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
-        self.kept_ns = self.entry.stamp_ns if self.entry else 0
-        self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
-        self.corrections: tuple[Recount, ...] = read(db, CorrectedClearance)
-        former = [audit.joint for audit in self.audits if audit.joint]
-        self.states = (*former, *(self.entry.joints if self.entry else ()))
-        self.commissioned = next(reversed(read(db, Commissioned)), None)
-        self.commissioned_torques = commissioned_torques(read(db, CommissionedTorque))
-        self.parameters = next(reversed(read(db, IdentifiedLeg)), None)
-        self.references = [*reversed(read(db, SimulatedReference))]
 
     @property
     def waiting(self) -> int:
@@ -304,7 +281,7 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     return ledger
 
 
-def read_ledger(path: Path, binding: Binding) -> LedgerContent:
+def read_ledger(path: Path, binding: Mapping[str, str]) -> LedgerContent:
     """Read a ledger of a leg for who only looks: from a copy, because a running monitor locks its ledger.
 
     Raises
@@ -317,7 +294,7 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
         if not copy.is_file():
             raise LedgerError(f"{path}: cannot be read: the file does not exist")
         with closing(connect(copy, binding)) as db, damage_refused(path):
-            return LedgerContent.of(db)
+            return LedgerContent(db)
 
 
 def _place(path: Path) -> tuple[int, int] | None:

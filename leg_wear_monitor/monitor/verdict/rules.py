@@ -11,7 +11,7 @@ import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor import alarms
-from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, QUANTITIES, SILENCE
+from leg_wear_monitor.monitor.alarm_specs import INPUT_KINDS, KINDS, QUANTITIES, SILENCE
 from leg_wear_monitor.monitor.alarms import (
     ADVICE,
     CAUSES_OF_ALARMS,
@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.alarms import (
     time_words,
 )
 from leg_wear_monitor.monitor.diagnosis.state import Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.input_health import INPUT_RULES
+from leg_wear_monitor.monitor.input_health import INPUT_FAULTS
 from leg_wear_monitor.monitor.verdict.situation import (
     ACTS,
     BOTH,
@@ -42,7 +42,8 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     words_of_cause,
 )
 from leg_wear_monitor.state import Evidence, Figure, Level, State, Verdict
-from leg_wear_monitor.twin import KINDS, TORQUE
+from leg_wear_monitor.twin import KINDS as SAMPLE_KINDS
+from leg_wear_monitor.twin import TORQUE
 
 # Causes of a deviating drive torque in words: one sentence and one remedy per cause.
 
@@ -135,7 +136,7 @@ class Hit:
     state: State = State.HEALTHY
 
 
-_TORQUE = KINDS[TORQUE].name
+_TORQUE = SAMPLE_KINDS[TORQUE].name
 
 Condition = Callable[[Situation], Sequence[Hit]]
 
@@ -561,35 +562,21 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
 # The condition of each rule, and its finding.
 
 
+_NOTED = (alarms.ALREADY_COUNTED, alarms.CRANK_ZERO, alarms.TRACKING_LOST, "NOT_THIS_LEG", "ENCODER")
+
 CONDITIONS: Mapping[str, Condition] = {
+    **{kind.upper(): raised(kind) for kind in KINDS},
+    **{cause.fault_code: has_cause(cause.fault_code) for cause in Cause},
+    **{code: has_fault(code) for code in INPUT_FAULTS},
+    **{code: noted(code) for code in _NOTED},
     "CLEARANCE": modelled_at_limit,
     "CLEARANCE_DETECTED": detected_at_limit,
     "CLEARANCE_ESTIMATED": estimated_at_limit,
     "CLEARANCE_CHANGED": diagnosed,
     "CLEARANCE_CORRECTED": corrected,
     "CLEARANCE_DEPARTURE": departing,
-    "TORQUE_SIGN": has_cause("TORQUE_SIGN"),
-    "TORQUE_SCALE": has_cause("TORQUE_SCALE"),
-    "TORQUE_TIMING": has_cause("TORQUE_TIMING"),
-    "TORQUE_MASS": has_cause("TORQUE_MASS"),
-    "MECHANISM_CHANGED": has_cause("MECHANISM_CHANGED"),
-    "TORQUE_LOAD": has_cause("TORQUE_LOAD"),
-    "TORQUE_NOISE": has_cause("TORQUE_NOISE"),
-    "TORQUE_BIAS": has_cause("TORQUE_BIAS"),
-    "FRICTION_CHANGED": has_cause("FRICTION_CHANGED"),
     "LOAD_NOT_OBSERVED": load_not_observed,
     "TORQUE_MISMATCH": mismatch,
-    "IMPACT_FORCE": raised("impact_force"),
-    "GROWTH": raised("growth"),
-    "REMAINING_LIFE": raised("remaining_life"),
-    "MATERIAL_LIMIT": raised("material_limit"),
-    **{kind.upper(): raised(kind) for kind in alarms.FOOT_LOAD_WORDS},
-    **{rule.code: has_fault(rule.code) for rule in INPUT_RULES},
-    alarms.ALREADY_COUNTED: noted(alarms.ALREADY_COUNTED),
-    alarms.CRANK_ZERO: noted(alarms.CRANK_ZERO),
-    alarms.TRACKING_LOST: noted(alarms.TRACKING_LOST),
-    "NOT_THIS_LEG": noted("NOT_THIS_LEG"),
-    "ENCODER": noted("ENCODER"),
     "BAD_INPUT": blinding,
     NO_GAIT_CYCLE: no_cycle,
     "FOOT_LOAD_MISSING": of_foot_load,
@@ -602,6 +589,7 @@ CONDITIONS: Mapping[str, Condition] = {
     ALARM: raised(least=Level.WARN),
     NONE: nothing_found,
 }
+"""By the rule's code. A rule with the name of an alarm, a cause or a fault of the input needs no entry."""
 
 
 def findings(situation: Situation) -> tuple[Verdict, ...]:

@@ -11,14 +11,11 @@ import attrs
 from leg_wear_monitor.configuration.strict import read_document, structure
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.files import share_directory
-from leg_wear_monitor.monitor.alarms import FOOT_LOAD_WORDS, amount, guide_of
-from leg_wear_monitor.monitor.input_health import INPUT_RULES
+from leg_wear_monitor.monitor.alarms import amount, guide_of
 from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
-from leg_wear_monitor.twin import CRANK, TORQUE
 
 TABLE_FILE = "config/verdict.yaml"
 ALARM, NONE, NO_GAIT_CYCLE = "ALARM", "NONE", "NO_GAIT_CYCLE"
-_OF_INPUT = {"INPUT_CRANK": CRANK, "INPUT_TORQUE": TORQUE}
 _HUNDRED = 100
 
 
@@ -29,6 +26,8 @@ class Rule:
     Attributes
     ----------
     state : State
+    fault : str
+        Fault of a sensor, ``{fault}`` in ``why``; its status says it as well.
     why, do : str
         In ``do``, ``{joints}`` names all joints of the cases with their labels, and ``{joint}`` is the first
         one as commands take it.
@@ -45,8 +44,9 @@ class Rule:
     """
 
     state: State
-    why: str = ""
-    do: str = ""
+    fault: str = ""
+    why: str
+    do: str
     not_valid: tuple[Figure, ...] = ()
     rests_on: str = ""
     advice: str
@@ -170,6 +170,12 @@ class VerdictTable:
     causes : dict of str to CauseWords
         By the name of the cause.
     measured : dict of str to MeasuredFigure
+    measurement : dict of str to str
+        Sentences on a clearance that an operator has measured.
+    codes : dict of str to str
+        Codes of statuses that are neither a rule nor an alarm, and their meaning.
+    samples : dict of str to str
+        Sentences on samples that are not used.
     """
 
     phrases: dict[str, str]
@@ -179,6 +185,9 @@ class VerdictTable:
     rules: dict[str, Rule]
     causes: dict[str, CauseWords]
     measured: dict[str, MeasuredFigure]
+    measurement: dict[str, str]
+    codes: dict[str, str]
+    samples: dict[str, str]
 
 
 @cache
@@ -195,16 +204,15 @@ def table() -> VerdictTable:
 
 @cache
 def rules() -> Mapping[str, Rule]:
-    """The rules by code; the faults of a stream of the input have the row of their stream."""
-    found: dict[str, Rule] = {}
-    for code, rule in table().rules.items():
-        if code in _OF_INPUT:
-            own = [one for one in INPUT_RULES if one.kind == _OF_INPUT[code]]
-            found |= {one.code: attrs.evolve(rule, why=one.why, do=one.do) for one in own}
-        else:
-            why = rule.why.replace("{fault}", FOOT_LOAD_WORDS.get(code.lower(), ""))
-            found[code] = attrs.evolve(rule, why=why, do=_with_phrases(rule.do))
-    return found
+    """The rules by code, with their phrases."""
+    return {
+        code: attrs.evolve(
+            rule,
+            why=rule.why.replace("{fault}", rule.fault),
+            do=_with_phrases(rule.do),
+        )
+        for code, rule in table().rules.items()
+    }
 
 
 def _with_phrases(text: str) -> str:

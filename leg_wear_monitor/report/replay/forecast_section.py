@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, bases, three_digits
-from leg_wear_monitor.monitor.forecast.measurement import validity
+from leg_wear_monitor.monitor.forecast.forecaster import validity
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.recordings.result import ReplaySummary, WornDepth
 from leg_wear_monitor.report.figure import length_unit

@@ -13,8 +13,8 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthLaw, no_law
-from leg_wear_monitor.monitor.forecast.measurement import measure
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientPrior,
@@ -188,7 +188,7 @@ def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
 
 FRESH = 3.0e-4
 PRIOR = Forecasting(new_clearance_sigma=5e-6 / FRESH)
-CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
+LEG = load_mechanism("bionic_leg")
 HOUR = 3_600_000_000_000
 
 
@@ -200,7 +200,8 @@ def worn(wear_m, cycles=1000, replaced_ns=0):
 def found(wear, mm, earlier=(), **more):
     """What a clearance in mm says, good to 5 µm."""
     given = {"sigma_m": 5e-6, "stamp_ns": 9 * HOUR, "who": "ann", **more}
-    return measure(PRIOR, CLEARANCE, wear, earlier, clearance_m=1e-3 * mm, **given)
+    forecaster = Forecaster(LEG, PRIOR, earlier, [wear.replaced_ns] * len(LEG.clearance_joints))
+    return forecaster.measured(wear, clearance_m=1e-3 * mm, **given)
 
 
 def test_without_a_measurement_the_belief_is_the_lognormal_prior():
@@ -250,7 +251,7 @@ def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
         low, middle, high = np.exp(result.after.log_factors((0.1, 0.5, 0.9)))
         assert middle == pytest.approx(factor, rel=0.5 if factor < 100.0 else 0.05)
         assert 0.0 < low < middle < high
-        assert f"{middle:.3g} times the nominal one" in result.words[-1]
+        assert f"{middle:.3g} times the nominal one" in result.lines[-2]
     else:  # next to no wear where the twin has counted much
         assert np.exp(result.after.log_factors(0.9)) < 0.2
 
@@ -293,43 +294,39 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     assert np.mean(below) == pytest.approx(0.5, abs=0.05)
 
 
-def test_a_measurement_says_in_words_what_it_taught():
-    assert "adds little" in found(worn(2e-7), 0.302).words[0]
+def test_a_measurement_says_what_it_taught():
+    assert found(worn(2e-7), 0.302).findings[-1] == "adds_little"
     result = found(worn(6e-5), 0.42)
-    assert not result.contradicts
-    assert result.measurement.counts
-    (line,) = result.words
-    assert line.startswith("the wear coefficient is 1.9")
-    assert "times smaller than before" in line
+    assert (result.contradicts, result.measurement.counts) == (False, True)
+    assert result.findings == ("measured", "modelled", "coefficient")
+    assert result.before.sigma > result.after.sigma
 
 
 def test_a_contradiction_is_said_and_kept_but_does_not_count():
     result = found(worn(1e-5), 0.9)
     assert (result.contradicts, result.measurement.counts) == (True, False)
-    assert "contradicts the model: the clearance of A is far larger" in result.words[0]
-    assert "if the part was replaced, reset its wear first" in result.words[1]
+    assert result.findings == ("measured", "modelled", "not_accepted", "again_or_accept", "unchanged")
     assert result.after.observations == 0
     # and the next one is judged as if it had not been
     assert not found(worn(1e-5), 0.31, [result.measurement]).contradicts
     asked_for = found(worn(1e-5), 0.9, accept=True)
     assert (asked_for.measurement.counts, asked_for.after.observations) == (True, 1)
     assert asked_for.after.mean > 1.0
-    assert "--accept" in result.words[1] and "--accept" not in " ".join(asked_for.words)
+    assert asked_for.findings[2:4] == ("accepted", "again")
 
 
-def test_an_accepted_measurement_that_no_wear_explains_is_doubted_in_words():
+def test_an_accepted_measurement_that_no_wear_explains_is_doubted():
     """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
     result = found(worn(5e-11), 0.63, accept=True)
-    assert "that is 6.6e-09 1/Pa, usually below 1e-09 1/Pa" in result.words[-1]
+    assert result.findings[-1] == "coefficient_doubted"
     shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
-    assert result.words[-1] in attrs.evolve(shown, limit_m=1e-3).lines
-    assert "usual" not in found(worn(1e-6), 0.33, accept=True).words[-1]
+    assert attrs.evolve(shown, limit_m=1e-3).findings[-1] == "coefficient_doubted"
+    assert found(worn(1e-6), 0.33, accept=True).findings[-1] != "coefficient_doubted"
 
 
 def test_a_clearance_smaller_than_when_new_contradicts_too():
     result = found(worn(6e-5), 0.2)
-    assert result.contradicts
-    assert "far smaller" in result.words[0]
+    assert result.contradicts and result.measurement.expected_below < 0.5
 
 
 def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():
@@ -341,7 +338,7 @@ def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():
 
 def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
-    assert "the clock is 2 h before the ledger's last entry" in early.words[0]
+    assert (early.clock_late_s, early.findings[2], right.findings[2]) == (7200.0, "late_clock", "coefficient")
     np.testing.assert_array_equal(early.after.weight, right.after.weight)
 
 

@@ -18,7 +18,6 @@ from leg_wear_monitor.monitor.forecast.growth import (
     ModelError,
     SimulatedLife,
     cycles_to,
-    extended,
     fitted_law,
     growth_rate,
     model_error,
@@ -35,7 +34,7 @@ P90 = NormalDist().inv_cdf(0.9)
 def window(growths, moving_s=1.0, cycles=30):
     found = GrowthWindow()
     for growth in growths:
-        found = extended(found, growth, moving_s, cycles)
+        found = found.extended(growth, moving_s, cycles)
     return found
 
 

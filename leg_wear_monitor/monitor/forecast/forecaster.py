@@ -1,0 +1,491 @@
+"""The forecaster: a new forecast once a minute, and the effects of measured clearances."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.estimate.cause import SURE_SIGMAS
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.loader import measured_fault, sigma_fault
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.monitor.alarms import WARN_FRACTION
+from leg_wear_monitor.monitor.config.settings import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.growth import (
+    GrowthRate,
+    GrowthWindow,
+    ModelError,
+    growth_rate,
+    law_of,
+)
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
+    CoefficientEstimate,
+    estimate_coefficient,
+    usual_prior,
+)
+from leg_wear_monitor.monitor.ledger.entry import (
+    CorrectedClearance,
+    JointWear,
+    Measurement,
+    Recount,
+)
+from leg_wear_monitor.monitor.verdict.verdict import table
+from leg_wear_monitor.twin.statistics import CycleStatistics
+
+# Accuracy of past forecasts: the ledger has the expected value of each measured clearance.
+
+
+LEAST = 5  # measurements, below which fractions have no meaning
+
+
+def validity(measurements: Sequence[Measurement]) -> str:
+    """Agreement of measurements with the forecasts before each of them, in a line for operators.
+
+    Measurements that contradict the model count as well, and withdrawn measurements do not. In the long run
+    80 % are between the p10 and the p90 of the expected clearance.
+    """
+    below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
+    within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
+    text = f"{within} of {len(below)} measured clearances were between expected p10 and p90"
+    if len(below) < LEAST:
+        return f"{text}; too few to evaluate the forecast"
+    bias = float(below.mean() - 0.5)  # above 0, joints wear faster than forecast
+    # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
+    if abs(bias) * np.sqrt(12.0 * len(below)) < 2.0:
+        return f"{text}; no bias found"
+    return f"{text}; joints wear {'faster' if bias > 0.0 else 'slower'} than forecast"
+
+
+CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
+
+AT_LIMIT, CONTRADICTS_MODEL, NOT_STORED = "AT_LIMIT", "CONTRADICTS_MODEL", "NOT_STORED"
+"""Codes that begin a service's reply in brackets if the operator has to act: ``[AT_LIMIT] A: …``."""
+
+_SAYS_SOMETHING = 0.9  # a measurement is informative if it leaves at most this fraction of the spread
+
+
+_MOST_PER_PA: float = attrs.fields_dict(Clearance)["wear_coefficient"].metadata["usual"][1]
+
+
+@attrs.frozen(eq=False, kw_only=True)
+class MeasurementResult:
+    """Meaning of a measurement.
+
+    Attributes
+    ----------
+    measurement : Measurement
+        To be noted in the ledger.
+    before, after : CoefficientEstimate
+        Of the joint's wear coefficient.
+    contradicts : bool
+        True if the model holds it next to impossible.
+    modelled_m : float
+        Clearance that the twin had modelled for this part.
+    nominal_per_pa : float
+        Nominal wear coefficient of the joint's softer surface.
+    clock_late_s : float
+        Time from the measurement to the last entry of the ledger, which should be before it.
+    earlier : sequence of Measurement
+        All of the ledger, without this one.
+    shown_m, shown_sigma_m, shown_by : float, float, str
+        Estimate of the joint by encoders or the drive torque before, with its source in words; NaN and empty
+        without an estimate.
+    eased : str
+        Effect on an alarm that an earlier measurement had raised: a name of a sentence; empty if it stays.
+    limit_m : float
+        Limit of the joint's clearance.
+    """
+
+    measurement: Measurement
+    before: CoefficientEstimate
+    after: CoefficientEstimate
+    contradicts: bool
+    modelled_m: float
+    nominal_per_pa: float
+    clock_late_s: float
+    earlier: Sequence[Measurement]
+    shown_m: float = math.nan
+    shown_sigma_m: float = math.nan
+    shown_by: str = ""
+    eased: str = ""
+    limit_m: float = math.nan
+
+    @property
+    def agrees(self) -> bool:
+        """True if the measurement agrees with the estimate by encoders or the drive torque."""
+        sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
+        return abs(self.measurement.clearance_m - self.shown_m) <= SURE_SIGMAS * sigma_m  # not with NaN
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Names of the sentences on this measurement in the table of the verdict."""
+        now, limit_m, found = self.measurement, self.limit_m, ["measured", "modelled"]
+        if now.clearance_m >= limit_m:
+            found.append("at_limit")
+        elif now.clearance_m >= WARN_FRACTION * limit_m:
+            found.append("near_limit")
+        found += [self.eased] if self.eased else []
+        if self.agrees:
+            found.append("agrees")
+        elif math.isfinite(self.shown_m + self.shown_sigma_m):
+            is_ended = now.clearance_m + SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m
+            found.append("differs_and_ends" if is_ended else "differs")
+        if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
+            return (*found, *(("not_by_wear", self._change) if now.counts else ("not_by_wear_unused",)))
+        found += ["late_clock"] if self.clock_late_s > 0.0 else []
+        if self.contradicts:
+            found += ["accepted", "again"] if now.counts else ["not_accepted", "again_or_accept"]
+        return (*found, self._change)
+
+    @property
+    def _change(self) -> str:
+        """Name of the sentence on the wear coefficient."""
+        if self.after.observations == self.before.observations:
+            return "unchanged"
+        if self.after.sigma > _SAYS_SOMETHING * self.before.sigma:
+            return "adds_little"
+        is_doubted = self.contradicts and self._factors[1] * self.nominal_per_pa > _MOST_PER_PA
+        return "coefficient_doubted" if is_doubted else "coefficient"
+
+    @property
+    def _factors(self) -> list[float]:
+        """The joint's wear coefficient over the nominal one: p10, p50, p90."""
+        return list(np.exp(self.after.log_factors((0.1, 0.5, 0.9))).tolist())
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The measurement and its effects for operators, one line each."""
+        now, (low, middle, high), texts = self.measurement, self._factors, table().measurement
+        words = {
+            "joint": now.joint,
+            "size": f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}",
+            "cycles": now.cycles,
+            "modelled": _mm(self.modelled_m),
+            "limit": _mm(self.limit_m),
+            "by": self.shown_by,
+            "shown": f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}",
+            "hours": f"{self.clock_late_s / 3600.0:.3g}",
+            "more": "larger" if now.expected_below > 0.5 else "smaller",
+            "factors": f"{middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90)",
+            "narrower": f"{self.before.sigma / self.after.sigma:.3g}",
+            "per_pa": f"{middle * self.nominal_per_pa:.2g} 1/Pa, usually below {_MOST_PER_PA:g} 1/Pa",
+        }
+        lines = (texts[name].format(**words) for name in self.findings)
+        return (*lines, validity([*self.earlier, now]))
+
+    @property
+    def codes(self) -> list[str]:
+        """Codes of the findings on which the caller has to act."""
+        at_limit = [AT_LIMIT] if self.measurement.clearance_m >= self.limit_m else []
+        return at_limit + ([CONTRADICTS_MODEL] if self.contradicts and not self.agrees else [])
+
+
+def with_codes(codes: Sequence[str], reply: str) -> str:
+    """A reply of a service that begins with codes; `has_codes` finds them."""
+    return f"[{', '.join(codes)}] {reply}" if codes else reply
+
+
+def has_codes(reply: str) -> bool:
+    """True if a service's reply has a code: the operator has to act."""
+    return reply.startswith("[")
+
+
+def _mm(value_m: float) -> str:
+    return f"{1.0e3 * value_m:.4g} mm"
+
+
+# Forecasts as gait cycles come in: renewed once a minute of their stamps, or when more is known.
+
+
+_T = TypeVar("_T")
+
+RENEWED_NS = 60_000_000_000
+
+
+class Forecaster:
+    """Forecasts all clearance joints, and the leg.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As the configuration wants it.
+    settings : Forecasting
+    measurements : sequence of Measurement
+        Of the ledger.
+    replaced_ns : sequence of int
+        When each joint's part was replaced, 0 if it never was.
+    corrections : sequence of CorrectedClearance and CoefficientSpan
+        Of the ledger.
+
+    Attributes
+    ----------
+    growth : tuple of GrowthWindow
+    coefficient_estimates : tuple of CoefficientEstimate
+    measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
+        Of the ledger, and since.
+
+    Raises
+    ------
+    ConfigError
+        For a file of lives that cannot be used.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: Forecasting,
+        measurements: Sequence[Measurement],
+        replaced_ns: Sequence[int],
+        corrections: Sequence[Recount] = (),
+    ) -> None:
+        self._settings, self._clearance_joints = settings, mechanism.clearance_joints
+        self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+        self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
+        self._law = law_of(mechanism, settings.growth_law_file, settings.model_sigma)
+        self.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
+        self.measurements, self.corrections = tuple(measurements), tuple(corrections)
+        self._last: Forecast | None = None  # None before the first, and when something is new
+        self._stamp_ns, self._known = 0, 0  # stamp of the last forecast; joints whose growth was known then
+        self.coefficient_estimates = tuple(
+            self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
+        )
+
+    def after(
+        self,
+        statistics: CycleStatistics,
+        wear_m: Floats,
+        limits_m: Sequence[float],
+        is_valid: Callable[[], bool],
+        model: ModelError,
+    ) -> Forecast:
+        """Forecast after a gait cycle: a new one if it is due, else the last.
+
+        Parameters
+        ----------
+        statistics : CycleStatistics
+        wear_m : (k,) array
+            Wear modelled by the twin for each part [m].
+        limits_m : sequence of float
+            Of the mean clearances.
+        is_valid : callable
+            True if the leg is in the range of the model.
+        model : ModelError
+            Error of the growth because of the load.
+        """
+        joints = zip(self.growth, statistics.growth_mean_m.tolist(), strict=True)
+        cycles, moving_s = self._settings.window_cycles, statistics.moving_s
+        self.growth = tuple(window.extended(growth_m, moving_s, cycles) for window, growth_m in joints)
+        is_recent = 0 <= statistics.stamp_ns - self._stamp_ns < RENEWED_NS
+        rates = [growth_rate(window) for window in self.growth]
+        if self._last is None or not is_recent or _known(rates) > self._known:
+            self._stamp_ns = statistics.stamp_ns
+            return self.renewed(wear_m, limits_m, is_valid(), model)
+        return self._last
+
+    def renewed(
+        self,
+        wear_m: Floats,
+        limits_m: Sequence[float],
+        is_valid: bool,
+        model: ModelError,
+    ) -> Forecast:
+        """A new forecast from the present state; parameters as in `after`."""
+        rates = [growth_rate(window) for window in self.growth]
+        self._known = _known(rates)
+        now = [
+            JointCondition(
+                joint=joint,
+                fresh_m=self._fresh_m[k],
+                wear_m=float(wear_m[k]),
+                limit_m=limits_m[k],
+                growth_m=rate.per_cycle_m if rate else None,
+                growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,
+                has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
+            )
+            for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
+        ]
+        # the window of a new part is shorter than the windows of the other joints
+        walked = max((window.moving_s for window in self.growth), key=len)
+        self._last = forecast(
+            now,
+            self.coefficient_estimates,
+            self._settings,
+            self._law,
+            cycle_s=float(np.mean(walked)),
+            valid=is_valid,
+        )
+        return self._last
+
+    def expire(self) -> None:
+        """Make a new forecast after the next gait cycle, because its inputs have changed."""
+        self._last = None
+
+    def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
+        """Last measurement of each joint's present part, None without one."""
+        parts = zip(self._clearance_joints, replaced_ns, strict=True)
+        return tuple(next(reversed(self._of_part(*part)), None) for part in parts)
+
+    def _of_part(self, joint: str, replaced_ns: int) -> list[Measurement]:
+        """Measurements of one part of a joint that were not withdrawn."""
+        part = (joint, replaced_ns)
+        known = (one for one in self.measurements if not one.is_withdrawn)
+        return [one for one in known if (one.joint, one.replaced_ns) == part]
+
+    def replaced(self, joint: str, replaced_ns: int) -> None:
+        """Forget the growth of a joint, and estimate its coefficient from all that is known of its part."""
+        self.growth = _with(self.growth, self._clearance_joints.index(joint), GrowthWindow())
+        self.estimate_anew(joint, replaced_ns)
+
+    def estimate_anew(self, joint: str, replaced_ns: int) -> None:
+        """Estimate the wear coefficient of a joint from all that is known of its part."""
+        k = self._clearance_joints.index(joint)
+        self._update_coefficients(k, self._estimate(k, replaced_ns))
+
+    def corrected(self, correction: CorrectedClearance) -> None:
+        """Start the wear of a joint again from a corrected clearance."""
+        self.corrections += (correction,)
+        self.replaced(correction.joint, correction.replaced_ns)
+
+    def measured(
+        self,
+        wear: JointWear,
+        *,
+        clearance_m: float,
+        sigma_m: float,
+        stamp_ns: int,
+        who: str,
+        kept_ns: int = 0,
+        accept: bool = False,
+        limit_m: float = math.nan,
+    ) -> MeasurementResult:
+        """Update with a measured clearance.
+
+        Parameters
+        ----------
+        wear : JointWear
+            The joint's present part. The measurement counts for the wear in it, whatever the clock says.
+        clearance_m, sigma_m : float
+            Radial, and its standard deviation.
+        stamp_ns : int
+            By the clock.
+        who : str
+        kept_ns : int
+            Stamp of the ledger's last entry, 0 if there is none.
+        accept : bool
+            True if it counts even if it contradicts the model.
+        limit_m : float
+            Limit of the clearance.
+
+        Raises
+        ------
+        ConfigError
+            For impossible values: they are likely meant in a different unit.
+        """
+        k, joint = self._clearance_joints.index(wear.name), wear.name
+        fresh_m, radius_m = self._fresh_m[k], self._clearances[k].bushing_radius
+        for name, fault in (
+            ("clearance", measured_fault(joint, fresh_m, radius_m, clearance_m)),
+            ("sigma", sigma_fault(clearance_m, sigma_m)),
+        ):
+            if fault:
+                raise ConfigError(name, "", fault)
+        before = self._estimate(k, wear.replaced_ns)
+        below = before.probability_below(ClearanceAtWear(clearance_m, sigma_m, wear.mean_m))
+        contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        new = Measurement(
+            stamp_ns=stamp_ns,
+            joint=joint,
+            who=who,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            wear_m=wear.mean_m,
+            cycles=wear.cycles,
+            replaced_ns=wear.replaced_ns,
+            expected_below=below,
+            counts=accept or not contradicts,
+        )
+        earlier, self.measurements = self.measurements, (*self.measurements, new)
+        self.estimate_anew(joint, wear.replaced_ns)
+        return MeasurementResult(
+            measurement=new,
+            before=before,
+            after=self.coefficient_estimates[k],
+            contradicts=contradicts,
+            modelled_m=fresh_m + wear.mean_m,
+            nominal_per_pa=max(self._clearances[k].wear_coefficient),
+            clock_late_s=1.0e-9 * (kept_ns - stamp_ns) if kept_ns else 0.0,
+            earlier=earlier,
+            limit_m=limit_m,
+        )
+
+    def withdrawn(self, number: int, stamp_ns: int, who: str) -> Measurement:
+        """Withdraw the measurement with an `id`; the estimate of its joint is renewed by `estimate_anew`."""
+        found = {one.id: one for one in self.measurements if one.id}
+        if number not in found or found[number].is_withdrawn:
+            fault = "is withdrawn already" if number in found else "is not in the ledger"
+            raise LegWearError(f"measurement {number}: {fault}")
+        now = attrs.evolve(found[number], withdrawn_ns=stamp_ns, withdrawn_by=who)
+        measurements = self.measurements
+        self.measurements = tuple(now if one.id == number else one for one in measurements)
+        return now
+
+    def best_estimate_m(self, k: int, modelled_m: float) -> float:
+        """Median of the clearance of joint k from wear model and measurements; NaN without a measurement."""
+        estimate = self.coefficient_estimates[k]
+        return estimate.clearance_m(modelled_m - self._fresh_m[k]) if estimate.observations else math.nan
+
+    def use_estimate(self, k: int, observation: ClearanceAtWear, replaced_ns: int) -> bool:
+        """Update with a clearance estimated from encoders, instead of the previous one.
+
+        Parameters
+        ----------
+        k : int
+            Of the clearance joint.
+        observation : ClearanceAtWear
+            Its error does not average out, so only the newest counts.
+        replaced_ns : int
+            When its part was replaced, 0 if it never was.
+
+        Returns
+        -------
+        bool
+            True if it is used: not if its tail probability is below `CONTRADICTS`.
+        """
+        estimate = self._estimate(k, replaced_ns)
+        below = estimate.probability_below(observation)
+        is_plausible = CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        self._update_coefficients(
+            k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
+        )
+        return is_plausible
+
+    def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
+        """Estimate for a part, from its prior, the measurements that count, and further ones."""
+        joint = self._clearance_joints[k]
+        counting = [one for one in self._of_part(joint, replaced_ns) if one.counts]
+        observations = [ClearanceAtWear(one.clearance_m, one.sigma_m, one.wear_m) for one in counting]
+        return estimate_coefficient(
+            self._settings,
+            self._fresh_m[k],
+            [*observations, *further],
+            usual_prior(self._clearances[k]),
+            [one for one in self.corrections if (one.joint, one.replaced_ns) == (joint, replaced_ns)],
+        )
+
+    def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
+        self.coefficient_estimates = _with(self.coefficient_estimates, k, coefficient_estimate)
+        self._last = None
+
+
+def _known(rates: Sequence[GrowthRate | None]) -> int:
+    return sum(rate is not None for rate in rates)
+
+
+def _with(values: tuple[_T, ...], k: int, new: _T) -> tuple[_T, ...]:
+    """Values with a new value at k."""
+    return (*values[:k], new, *values[k + 1 :])

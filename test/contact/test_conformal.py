@@ -222,7 +222,7 @@ def test_the_arc_widens_with_force_and_softness_and_as_the_clearance_falls():
 
 def test_what_is_said_of_a_wide_arc_has_its_numbers_and_the_law_that_holds():
     text = contact_doubt(math.radians(41.0), 800.0, 0.01, is_winkler=False) or ""
-    assert text.startswith("contact half angle 41 deg at 800 N (13.1 mm wide in a radius of 10 mm), ")
+    assert text.startswith("contact half angle 41 deg at 800 N (13.1 mm wide in a radius of 10 mm). ")
     assert "up to about 30 deg; normal_law winkler is for a conformal one" in text
     assert contact_doubt(NARROW_RAD, 800.0, 0.01, is_winkler=False) is None
     assert contact_doubt(math.radians(41.0), 800.0, 0.01, is_winkler=True) is None

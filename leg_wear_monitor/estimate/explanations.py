@@ -1,5 +1,6 @@
 """Possible explanations of a change of the torque's signature: a clearance, or other causes."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -17,13 +18,19 @@ from leg_wear_monitor.estimate.cause import (
 from leg_wear_monitor.estimate.signature import Changes, SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
-# relative error of a clearance's effect, and of an opening: legs with masses 4 % off show 10 to 27 % less
-# (2026-11-23)
+# relative error of a clearance's effect for each doubling of the clearance, one at least, and of an opening:
+# legs with masses 4 % off show 10 to 27 % less (2026-11-23); single joints in full coordinates leave 0.25 to
+# 0.35 of the effect at 1 mm, 0.3 to 0.9 at 2 mm
 MODEL_ERROR = 0.2
+# relative error of two openings, over the geometric mean of their effects: the effects do not add up, because
+# impacts of one joint relieve another joint. 30 pairs of 0.4 to 0.6 mm in full coordinates leave 0.4 to 1.0
+# of the sum
+_TOGETHER = 0.6
 
 # error of a change's shape in the model, over its root mean square in units of the scatter of gait cycles:
-# 0.27 to 0.6 where masses are 4 % off, 0.05 to 0.18 where they were identified (2026-11-26)
-MODEL_NOISE = 0.3
+# 0.27 to 0.6 where masses are 4 % off, 0.05 to 0.18 where they were identified (2026-11-26). Names are sure
+# only of an identified leg; sizes are estimated of others as well
+MODEL_NOISE, _NOISE_OF_NAMES = 0.3, 0.1
 
 _APART = 2.0  # standard deviations within which likely sizes scatter about the best size
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
@@ -34,10 +41,9 @@ _CORNER = 1.0e200
 # a different sensor has to leave less than this fraction of the mean square: the residual of a delay that is
 # 2.5 ms off, a step of the search
 _LEFT = 0.5
-# The search for two open joints tries seven sizes of each joint, a fifth apart; the sizes of the second joint
-# lie about 1.5 times its modelled clearance. A second round tries finer steps about the best sizes.
-_LEAST_SECOND = 1.2  # over the modelled clearance: a smaller second opening may be an error of the model
-_PAIR_SIZES, _PAIR_ROUNDS, _PAIR_STEP, _PAIR_MIDDLE = 3, 2, 0.2, 1.5
+# The search for two open joints tries six sizes of each joint, then five about the best ones. A smaller
+# opening may be an error of the model.
+_LEAST_OPENING, _PAIR_SIZES, _PAIR_FINER = 1.0 + MODEL_ERROR, 6, 5
 # largest mean square that noise alone explains: up to 1.4 for a healthy leg, also with a real motor's
 # stick-slip. If two joints had opened, which no single joint explains, noise would explain most of it
 # (2026-11-27)
@@ -253,9 +259,9 @@ class Explainer:
         """Covariance (F, F) of the mean of some cycles' signatures in a leg as modelled."""
         return np.asarray(self.model.covariance / cycles + self._constant)
 
-    def error(self, change: Floats) -> Floats:
+    def error(self, change: Floats, noise: float = MODEL_NOISE) -> Floats:
         """Variance (n,) of the model's error for changes (n, F), as a part of a gait cycle's variance."""
-        return np.asarray(MODEL_NOISE**2 * np.square(self._apart @ change.T).mean(axis=0))
+        return np.asarray(noise**2 * np.square(self._apart @ change.T).mean(axis=0))
 
     def whitening(self, cycles: int, scatter: float) -> tuple[Floats, float]:
         """Matrix (F, F) that makes the mean of some cycles' signatures independent with variances of 1.
@@ -293,75 +299,43 @@ class Explainer:
         factors += [_Quantity(Cause.JOINT_FRICTION, "", model.friction, i, 1.0) for i in friction]
         for one in factors:
             found += _changed_by(self._best(seen, one, _FACTORS[one.cause]), nothing.square)
-        best = min(found, key=lambda one: one.misfit)
         # without a baseline, a second opening would mostly explain the errors of the model
-        if best.cause is Cause.CLEARANCE and self.baseline.offset.any():
-            found += self._with_second(seen, best, modelled_m)
+        if self.baseline.offset.any():
+            pairs = itertools.combinations(range(len(modelled_m)), 2)
+            found += [self._pair(seen, np.array(pair), modelled_m) for pair in pairs]
         return sorted(found, key=lambda one: one.misfit)
 
-    def _with_second(self, seen: _Seen, first: Explanation, modelled_m: Floats) -> list[Explanation]:
-        """Explanations by two open joints: the joint that explains most alone, and a second joint.
-
-        The wider change of two open joints nearly always has the right name, but a wrong size.
-        """
-        k, found = self.joints.index(first.subject), []
-        for other in range(len(modelled_m)):
-            if other == k:
-                continue
-            pair, step = np.array([k, other]), _PAIR_STEP
-            middle = np.log([0.5 * (first.value + modelled_m[k]), _PAIR_MIDDLE * modelled_m[other]])
-            for _ in range(_PAIR_ROUNDS):
-                offsets = step * np.arange(-_PAIR_SIZES, _PAIR_SIZES + 1)
-                sizes = np.exp(middle + np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2))
-                least = modelled_m[pair] * (1.0, _LEAST_SECOND)
-                sizes = np.clip(sizes, least, np.maximum(self.model.joints.grid[pair, -1], least))
-                misfits = self._misfits_of_pair(seen, pair, sizes, modelled_m)
-                best = int(misfits.value.argmin())
-                middle, step = np.log(sizes[best]), step / _PAIR_SIZES
-            found.append(self._pair(seen, pair, sizes, misfits, modelled_m))
-        return found
-
-    def _pair(
-        self, seen: _Seen, pair: Ints, sizes: Floats, misfits: "Misfits", modelled_m: Floats
-    ) -> Explanation:
-        """Explanation by two open joints, over some clearances (n, 2) [m] near the best pair."""
-        best = int(misfits.value.argmin())
+    def _pair(self, seen: _Seen, pair: Ints, modelled_m: Floats) -> Explanation:
+        """Best explanation by two open joints."""
+        counted_m = modelled_m[pair]
+        least_m = _LEAST_OPENING * counted_m
+        widest_m = np.maximum(self.model.joints.grid[pair, -1], least_m)
+        tried = [np.geomspace(*ends, _PAIR_SIZES) for ends in zip(least_m, widest_m, strict=True)]
+        for _ in range(2):
+            sizes = np.stack(np.meshgrid(*tried), axis=-1).reshape(-1, 2)
+            misfits = self._misfits(seen, self.model.joints, pair, sizes, counted_m)
+            best, step = int(misfits.value.argmin()), (widest_m / least_m) ** (1.0 / (_PAIR_SIZES - 1))
+            finer = step[:, None] ** np.linspace(-0.7, 0.7, _PAIR_FINER)
+            tried = list(np.maximum(sizes[best][:, None] * finer, least_m[:, None]))
         square = float(misfits.square[best]) / len(seen.mean)
         likely = np.exp(-0.5 * (misfits.value - misfits.value[best]) / max(1.0, square))
         mean_m = likely @ sizes / likely.sum()
         own_m = np.sqrt(likely @ np.square(sizes - mean_m) / likely.sum())
-        joints = tuple(
-            NamedCause(
-                Cause.CLEARANCE,
-                float(mean_m[i]),
-                float(np.hypot(own_m[i], MODEL_ERROR * (mean_m[i] - modelled_m[joint]))),
-                self.joints[joint],
-            )
-            for i, joint in enumerate(pair.tolist())
-        )
+        sigma_m = np.hypot(own_m, MODEL_ERROR * (mean_m - counted_m))
+        names = [self.joints[k] for k in pair.tolist()]
+        each = zip(mean_m.tolist(), sigma_m.tolist(), names, strict=True)
+        joints = tuple(NamedCause(Cause.CLEARANCE, *one) for one in each)
         widest = max(joints, key=lambda one: one.value)
         return Explanation(
             cause=Cause.SEVERAL,
-            subject=" and ".join(sorted(one.subject for one in joints)),
+            subject=" and ".join(names),
             value=widest.value,
             sigma=widest.sigma,
-            joints=tuple(sorted(joints, key=lambda one: one.subject)),
+            joints=joints,
             counted=float(modelled_m[self.joints.index(widest.subject)]),
-            misfit=float(misfits.value[best]) + 2.0 * SURE_LOG_ODDS * max(1.0, square),
+            misfit=float(misfits.value[best]) + 2.0 * SURE_LOG_ODDS,  # the odds of a further cause
             square=square,
         )
-
-    def _misfits_of_pair(self, seen: _Seen, pair: Ints, sizes: Floats, modelled_m: Floats) -> "Misfits":
-        """How well some clearances (n, 2) [m] of two joints explain."""
-        changes, which = self.model.joints, np.tile(pair, len(sizes))
-        change = changes.at(sizes.ravel(), which)[0].reshape(len(sizes), 2, -1)
-        before = changes.at(modelled_m[pair], pair)[0]
-        change = (change - before).sum(axis=1)
-        variance = changes.scatter_at(sizes.ravel(), which).reshape(-1, 2).sum(axis=1)
-        scatter = seen.scatter + variance - changes.scatter_at(modelled_m[pair], pair).sum()
-        error = _diagonal(MODEL_ERROR * _nearby(change))
-        own = seen.covariance + scatter[:, None, None] * self.model.covariance
-        return Misfits(seen.rest - change, own + error)
 
     def _of_sensor(self, seen: _Seen) -> list[Explanation]:
         """The best of the other sensors; none where none explains.
@@ -383,11 +357,13 @@ class Explainer:
 
     def _best(self, seen: _Seen, one: _Quantity, values: Floats) -> Explanation:
         """Best of some values (n,) of a quantity, all else as modelled."""
-        misfits = self._misfits(seen, one, values).value
+        which, counted = np.array([one.number]), np.array([one.counted])
+        misfits = self._misfits(seen, one.changes, which, values[:, None], counted).value
         best = int(misfits.argmin())
         log_value, sigma = _vertex(np.log(values), misfits, best)
         value = float(np.exp(log_value))
-        square = float(self._misfits(seen, one, np.array([value])).square[0]) / len(seen.mean)
+        there = self._misfits(seen, one.changes, which, np.array([[value]]), counted)
+        square = float(there.square[0]) / len(seen.mean)
         poor = max(1.0, square)  # the square of Birge's ratio
         # values far from the best one may fit almost as well: then the mean of all. Where none fits, the
         # model is off by as much in neighbouring phases, which then are few independent numbers
@@ -406,13 +382,22 @@ class Explainer:
             square=square,
         )
 
-    def _misfits(self, seen: _Seen, one: _Quantity, values: Floats) -> "Misfits":
-        """Quality of the explanation by some values (n,) of a quantity."""
-        tried, which = np.append(values, one.counted), np.full(len(values) + 1, one.number)
-        at, variance = one.changes.at(tried, which)[0], one.changes.scatter_at(tried, which)
+    def _misfits(
+        self, seen: _Seen, changes: Changes, which: Ints, values: Floats, counted: Floats
+    ) -> "Misfits":
+        """Quality of the explanation by values (n, q) of one or two quantities (q,), all else as modelled."""
+        tried, of = np.vstack([values, counted]), np.tile(which, len(values) + 1)
+        at = changes.at(tried.ravel(), of)[0].reshape(*tried.shape, -1)
+        variance = changes.scatter_at(tried.ravel(), of).reshape(tried.shape).sum(axis=1)
         change, scatter = at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
+        near = _nearby(change)
+        error = np.square(_relative_error(values, counted)[:, :, None] * near).sum(axis=1)
+        if len(which) > 1:
+            error += _TOGETHER**2 * near.prod(axis=1)
+        together = change.sum(axis=1)
+        scatter = scatter + self.error(together, _NOISE_OF_NAMES)
         own = seen.covariance + scatter[:, None, None] * self.model.covariance
-        return Misfits(seen.rest - change, own + _diagonal(MODEL_ERROR * _nearby(change)))
+        return Misfits(seen.rest - together, own + _diagonal(np.sqrt(error)))
 
     def _others(self, seen: _Seen) -> list[Explanation]:
         """Best values of the nuisances, each with the spread by which it is most probable.
@@ -489,14 +474,19 @@ def _diagonal(sigma: Floats) -> Floats:
     return np.asarray(np.eye(sigma.shape[1]) * np.square(sigma)[:, :, None])
 
 
+def _relative_error(values: Floats, counted: Floats) -> Floats:
+    """Relative errors of the changes from modelled values to others."""
+    return np.asarray(MODEL_ERROR * np.maximum(1.0, np.abs(np.log2(values / counted))))
+
+
 def _nearby(change: Floats) -> Floats:
-    """Root mean squares of changes (n, F) over each phase and its two neighbours.
+    """Root mean squares of changes (..., F) over each phase and its two neighbours.
 
     Impacts of a leg that differs from the simulated leg come a bit earlier or later. A phase that has none
     here may have one there: G at 2 mm, where impacts move most, left 17 to 36, and now 7 to 9 (2026-11-27).
     """
-    square = np.square(change).reshape(len(change), 2, -1)  # mean, roughness
-    around = square + np.roll(square, 1, axis=2) + np.roll(square, -1, axis=2)
+    square = np.square(change).reshape(*change.shape[:-1], 2, -1)  # mean, roughness
+    around = square + np.roll(square, 1, axis=-1) + np.roll(square, -1, axis=-1)
     return np.asarray(np.sqrt(around / 3.0).reshape(change.shape))
 
 
@@ -568,9 +558,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
 
 
 def _is_rival(one: Explanation, best: Explanation) -> bool:
-    """True if an explanation contradicts the best one; a second worn joint only adds to the first joint."""
-    if one.cause is Cause.SEVERAL and best.cause is Cause.CLEARANCE:
-        return False
+    """True if an explanation contradicts the best one."""
     return (one.cause.fault_code, one.subject) != (best.cause.fault_code, best.subject)
 
 

@@ -29,9 +29,10 @@ SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corre
 _WHOLE = 1.4
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-# for a leg that differs from its reference, because two unusual steps are not a change
+# for a leg that differs from its reference, where two strange steps are no change, and for a leg on the
+# ground: five gait cycles tell whether its load has changed
 _LEAST_CYCLES_UNLIKE = 6
-_FIT_EVERY = 10  # gait cycles, except for the first cycles of a change
+_FIT_EVERY = 10  # gait cycles, but for the first ones of a change
 
 # times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
 # the first cycles of a change were selected by their detection. Four cycles of J at 0.55 mm under 300 N gave
@@ -205,7 +206,8 @@ class Evidence:
 
     def _least_cycles(self, state: TorqueState) -> int:
         """Gait cycles since a change before it is explained."""
-        return _LEAST_CYCLES if self._models.fits(state) else _LEAST_CYCLES_UNLIKE
+        is_like = self._models.fits(state) and not state.is_loaded
+        return _LEAST_CYCLES if is_like else _LEAST_CYCLES_UNLIKE
 
     def _fits(self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int) -> bool:
         """True if a leg that was never commissioned matches the reference, except for one clearance at most.

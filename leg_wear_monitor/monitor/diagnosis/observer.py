@@ -425,7 +425,8 @@ class TorqueObserver(KeepsSamples):
         """Commission the leg anew if its load differs from the load of its reference.
 
         Once for each load: the load from the twin or a sensor may differ from the force of the reference. A
-        joint that was surely named before stays reported.
+        joint that was surely named before the load changed stays reported. A joint named since then does not:
+        a changed load looks like an open joint until the twin has found it.
         """
         state = self.state
         is_due = self._is_on_ground and len(state.carried_n) >= FIRST_CYCLES
@@ -433,7 +434,11 @@ class TorqueObserver(KeepsSamples):
             state.is_load_other = False
             return
         peak_n = float((state.reference.parameters.load @ self._up).max())
-        state.is_load_other = self._has_moved(peak_n, FIRST_CYCLES)
+        was_other, state.is_load_other = state.is_load_other, self._has_moved(peak_n, FIRST_CYCLES)
+        if state.is_load_other and not was_other:
+            earlier_ns = max((one.begin_ns for one in state.cycles[:-UNLIKE_CYCLES]), default=0)
+            state.changes = tuple(one for one in state.changes if one.since_ns <= earlier_ns)
+            state.detector, state.least_m = None, ()
         is_long = len(state.carried_n) == UNLIKE_CYCLES and state.load_rounds >= LOAD_ROUNDS
         if is_long and self._has_moved(peak_n, UNLIKE_CYCLES):
             state.settled += state.not_by_load

@@ -10,13 +10,11 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from leg_wear_monitor.estimate import torque_fit
-from leg_wear_monitor.estimate.joint_motion import Pair, Series, motion_of, paired, series
-from leg_wear_monitor.estimate.torque_fit import Start
+from leg_wear_monitor.estimate.joint_motion import Series, motion_of, paired, series
 from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD, TorqueModel
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.alarms import CRANK_ZERO
 from leg_wear_monitor.monitor.config.inputs import Cadence
@@ -46,55 +44,6 @@ _BACK_RAD = 0.25  # an angle that left its course is back if it is that near
 _NONE: Samples = np.zeros(0, GAIT_SAMPLE)
 
 
-@attrs.define
-class CrankZeroState:
-    """State of the search.
-
-    Attributes
-    ----------
-    zero : Zero or None
-        The present one.
-    former : Zero or None
-        The one before the angle left its course; None once it is sure that the encoder has restarted.
-    doubts : int
-        Evaluation periods since then.
-    off_rad : float
-        By how much the angle is off its former course.
-    times_found : int
-    turns : int
-        Turns of the present walk.
-    why : str
-        Why no zero was found; empty while there was no attempt.
-    rest : int
-        Periods until the next attempt.
-    waiting : tuple of Samples
-        Samples that wait for the zero, by evaluation periods; the last one is not over.
-    last_ns, last_rad : int, float
-        Stamp and angle of the last crank sample; stamp 0 before the first.
-    since_ns : int
-        Stamp of the first crank sample of this search.
-    has_passed : bool
-        True if samples were passed on; the twin counts the time from then on.
-    before_s : float
-        Time before, of earlier searches and of samples that waited too long.
-    """
-
-    zero: "Zero | None" = None
-    former: "Zero | None" = None
-    doubts: int = 0
-    off_rad: float = 0.0
-    times_found: int = 0
-    turns: int = 0
-    why: str = ""
-    rest: int = 0
-    waiting: tuple[Samples, ...] = (_NONE,)
-    last_ns: int = 0
-    last_rad: float = 0.0
-    since_ns: int = 0
-    has_passed: bool = False
-    before_s: float = 0.0
-
-
 class CrankZero(Observer):
     """Finds the zero of the crank's encoder.
 
@@ -103,11 +52,31 @@ class CrankZero(Observer):
     model : TorqueModel
     config : MonitorConfig
     tracker : TrackerSettings
+
+    Attributes
+    ----------
+    zero : Zero or None
+        The present one.
+    times_found : int
+    waiting : tuple of Samples
+        Samples that wait for the zero, by evaluation periods; the last one is not over.
     """
 
     def __init__(self, model: TorqueModel, config: MonitorConfig, tracker: TrackerSettings) -> None:
         self._model, self._config, self._tracker = model, config, tracker
-        self.state = CrankZeroState()
+        self.zero: Zero | None = None
+        self.times_found = 0
+        self.waiting: tuple[Samples, ...] = (_NONE,)
+        # the zero before the angle left its course, by how much it is off, and evaluation periods since then;
+        # None once it is sure that the encoder has restarted
+        self._former: Zero | None = None
+        self._off_rad, self._doubts = 0.0, 0
+        # turns of the present walk, why no zero was found in them, and periods until the next attempt
+        self._turns, self._why, self._rest = 0, "", 0
+        self._last_ns, self._last_rad = 0, 0.0  # the last crank sample; stamp 0 before the first
+        # stamp of the first crank sample of this search, and the time before it that was not monitored; the
+        # twin counts the time once samples were passed on
+        self._since_ns, self._before_s, self._has_passed = 0, 0.0, False
 
     def passed(self, samples: Samples, ends_period: bool) -> Samples:
         """Samples to track now, with the zero: these samples, earlier ones that waited, or none.
@@ -118,15 +87,15 @@ class CrankZero(Observer):
         ends_period : bool
             True if an evaluation period ends with them.
         """
-        state, out, begin = self.state, [_NONE], 0
+        out, begin = [_NONE], 0
         for at, off_rad in self._breaks(samples):
             out.append(self._taken(samples[begin:at]))
             begin = at
-            if state.former is None:
+            if self._former is None:
                 self._begin(int(samples["stamp_ns"][at]))
-            state.off_rad += off_rad
+            self._off_rad += off_rad
         out.append(self._taken(samples[begin:]))
-        if ends_period and state.zero is None:
+        if ends_period and self.zero is None:
             out.append(self._end_period())
         return np.concatenate(out)
 
@@ -135,15 +104,15 @@ class CrankZero(Observer):
 
         The encoder may have restarted in a gap, unless the angle continues after it.
         """
-        state, tracker = self.state, self._tracker
+        tracker = self._tracker
         is_possible = np.abs(samples["crank_angle_rad"]) <= KINDS[CRANK].largest
         at = np.flatnonzero((samples["kind"] == CRANK) & is_valid(samples) & is_possible)
         if not len(at):
             return []
         stamp_ns, angle = samples["stamp_ns"][at], samples["crank_angle_rad"][at]
-        state.since_ns = state.since_ns or int(stamp_ns[0])
-        before = (state.last_ns, state.last_rad) if state.last_ns else (stamp_ns[0], angle[0])
-        state.last_ns, state.last_rad = int(stamp_ns[-1]), float(angle[-1])
+        self._since_ns = self._since_ns or int(stamp_ns[0])
+        before = (self._last_ns, self._last_rad) if self._last_ns else (stamp_ns[0], angle[0])
+        self._last_ns, self._last_rad = int(stamp_ns[-1]), float(angle[-1])
         time_s = np.abs(1.0e-9 * np.diff(stamp_ns, prepend=before[0]))
         moved = (np.diff(angle, prepend=before[1]) + math.pi) % TURN - math.pi
         reach = tracker.largest_speed * time_s
@@ -154,88 +123,102 @@ class CrankZero(Observer):
 
     def _begin(self, stamp_ns: int) -> None:
         """Begin to look for the zero; samples that wait belong to a different one."""
-        state = self.state
-        if state.zero is None and not state.has_passed:
-            state.before_s += max(0.0, 1.0e-9 * (stamp_ns - state.since_ns))
-        state.former, state.zero, state.off_rad, state.doubts = state.zero, None, 0.0, 0
-        state.waiting, state.since_ns = (_NONE,), stamp_ns
-        state.turns, state.why, state.rest = 0, "", 0
+        if self.zero is None:
+            self._drop_until(stamp_ns)
+        self._former, self.zero, self._off_rad, self._doubts = self.zero, None, 0.0, 0
+        self.waiting, self._since_ns = (_NONE,), stamp_ns
+        self._turns, self._why, self._rest = 0, "", 0
+
+    def _drop_until(self, stamp_ns: int) -> None:
+        """Count the time until a stamp as not monitored."""
+        if not self._has_passed:
+            self._before_s += max(0.0, 1.0e-9 * (stamp_ns - self._since_ns))
+        self._since_ns = stamp_ns
 
     def _taken(self, samples: Samples) -> Samples:
         """Samples without a break: with the zero; none if they have to wait."""
-        state = self.state
-        if state.zero is None:
-            *before, last = state.waiting
-            state.waiting = (*before, np.concatenate([last, samples]))
+        if self.zero is None:
+            *before, last = self.waiting
+            self.waiting = (*before, np.concatenate([last, samples]))
             return _NONE
-        state.has_passed |= len(samples) > 0
+        self._has_passed |= len(samples) > 0
         samples = samples.copy()
-        samples["crank_angle_rad"] += state.zero.offset_rad
+        samples["crank_angle_rad"] += self.zero.offset_rad
         return samples
 
     def _end_period(self) -> Samples:
         """Look for the zero; returns the samples that need not wait any longer."""
-        state = self.state
-        if state.former and abs((state.off_rad + math.pi) % TURN - math.pi) < _BACK_RAD:
-            return self._released(state.former)  # it was a glitch
-        state.doubts += 1
-        if state.doubts >= _LONGEST_DOUBT:
-            state.former = None
-        waiting = np.concatenate(state.waiting)
-        walk = last_walk(waiting, self._config.cadence, BRIDGE_LIMIT_S)
-        state.turns, state.rest = walk.turns, max(0, state.rest - 1)
-        if walk.turns < LEAST_TURNS:
-            state.why = walk.why
-        elif not state.rest:
-            found = self._found(walk)
-            if isinstance(found, Zero):
-                state.times_found += 1
-                return self._released(found)
-            state.why, state.rest = found, _A_CYCLE
-        lengths = np.cumsum([len(part) for part in reversed(state.waiting)])
-        kept = min(_MOST_PERIODS, int(np.count_nonzero(lengths <= _MOST_SAMPLES)))
-        rest = state.waiting[-kept:]
-        first_ns = of_crank(np.concatenate(rest))["stamp_ns"][:1]
-        if kept < len(lengths) and len(first_ns):
-            state.before_s += 0.0 if state.has_passed else max(0.0, 1.0e-9 * (first_ns[0] - state.since_ns))
-            state.since_ns = int(first_ns[0])
-        state.waiting = (*rest, _NONE)
+        if self._former and abs(math.remainder(self._off_rad, TURN)) < _BACK_RAD:
+            return self._released(self._former)  # it was a glitch
+        self._doubts += 1
+        if self._doubts >= _LONGEST_DOUBT:
+            self._former = None
+        self._rest = max(0, self._rest - 1)
+        found = self._found(np.concatenate(self.waiting))
+        if isinstance(found, Zero):
+            self.times_found += 1
+            return self._released(found)
+        self._why = found
+        lengths = np.cumsum([len(part) for part in reversed(self.waiting)])
+        kept = self.waiting[-min(_MOST_PERIODS, int(np.count_nonzero(lengths <= _MOST_SAMPLES))) :]
+        first_ns = of_crank(np.concatenate(kept))["stamp_ns"][:1]
+        if len(kept) < len(lengths) and len(first_ns):
+            self._drop_until(int(first_ns[0]))
+        self.waiting = (*kept, _NONE)
         return _NONE
 
-    def _found(self, walk: "Walk") -> "Zero | str":
-        """The zero from the newest turns, else from all; else why it cannot be found."""
-        sampling = self._config.drive_torque.sampling
-        if walk.turns > LEAST_TURNS:
-            # a fault of the torque that is over must not be waited out
-            found = zero_of(walk.newest(LEAST_TURNS), self._model, sampling)
+    def _found(self, samples: Samples) -> "Zero | str":
+        """The zero from the newest turns, else from all; else why it is not found."""
+        sound = samples[is_valid(samples)]
+        cadence = self._config.cadence
+        origin_ns = int(np.median(sound["stamp_ns"])) if len(sound) else 0
+        longest_ns = int(_LONGEST * MOST_TURNS * 60.0e9 / abs(cadence.commanded_rpm))
+        sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # stray stamps are left out
+        crank = _series(of_crank(sound), "crank_angle_rad", origin_ns)
+        if not len(crank.value):
+            self._turns = 0
+            return "no crank sample can be used"
+        crank = attrs.evolve(crank, value=np.asarray(np.unwrap(crank.value)))
+        begins = _turns(crank, cadence)
+        self._turns = len(begins) - 1
+        if self._turns < LEAST_TURNS:
+            return "" if self._turns else _why_none(crank, cadence)
+        if self._rest:
+            return self._why
+        self._rest = _A_CYCLE
+        torque = _series(sound[np.abs(sound["torque_nm"]) <= KINDS[TORQUE].largest], "torque_nm", origin_ns)
+        found: Zero | str = ""
+        # a fault of the torque that is over must not be waited out
+        for turns in sorted({LEAST_TURNS, self._turns}):
+            begin_s = crank.time_s[begins[turns]]
+            walked = (torque.time_s >= begin_s) & (torque.time_s <= crank.time_s[-1])
+            parts = _part(crank, crank.time_s >= begin_s), _part(torque, walked)
+            found = zero_of(*parts, turns, self._model, self._config.drive_torque.sampling)
             if isinstance(found, Zero):
-                return found
-        return zero_of(walk, self._model, sampling)
+                break
+        return found
 
     def _released(self, zero: "Zero") -> Samples:
         """All samples that wait, with the zero."""
-        state = self.state
-        waiting, state.waiting = np.concatenate(state.waiting), (_NONE,)
-        state.zero, state.former, state.why = zero, None, ""
+        waiting, self.waiting = np.concatenate(self.waiting), (_NONE,)
+        self.zero, self._former, self._why = zero, None, ""
         return self._taken(waiting)
 
     @property
     def cause(self) -> str:
         """Why nothing is monitored at present; empty if the zero is known."""
-        state = self.state
-        if state.zero is not None:
+        if self.zero is not None:
             return ""
-        turns = f"{min(state.turns, LEAST_TURNS)} of {LEAST_TURNS} turns"
-        if state.turns > LEAST_TURNS:
-            turns = f"{state.turns} turns were not enough"
-        return f"searching for the crank's zero: {turns}" + (f", {state.why}" if state.why else "")
+        turns = f"{min(self._turns, LEAST_TURNS)} of {LEAST_TURNS} turns"
+        if self._turns > LEAST_TURNS:
+            turns = f"{self._turns} turns were not enough"
+        return f"searching for the crank's zero: {turns}" + (f", {self._why}" if self._why else "")
 
     @property
     def unmonitored_s(self) -> float:
         """Time [s] of samples that wait, or waited in vain, as far as the twin does not count it."""
-        state = self.state
-        waiting_s = 0.0 if state.zero else max(0.0, 1.0e-9 * (state.last_ns - state.since_ns))
-        return state.before_s + waiting_s
+        waiting_s = 0.0 if self.zero else max(0.0, 1.0e-9 * (self._last_ns - self._since_ns))
+        return self._before_s + waiting_s
 
     @property
     def notes(self) -> Mapping[str, Sequence[str]]:
@@ -245,12 +228,12 @@ class CrankZero(Observer):
     @property
     def statuses(self) -> Sequence[Status]:
         """The zero of the crank's encoder, or why it is not known."""
-        state, zero = self.state, self.state.zero
+        zero = self.zero
         values = {
             **{name: getattr(zero, name, math.nan) for name in ("offset_rad", "sigma_rad", "mismatch")},
-            "turns": float(zero.turns if zero else state.turns),
+            "turns": float(zero.turns if zero else self._turns),
             "least_turns": float(LEAST_TURNS),
-            "times_found": float(state.times_found),
+            "times_found": float(self.times_found),
             "not_monitored_s": self.unmonitored_s,
         }
         if zero is None:
@@ -267,84 +250,28 @@ _STANDS = 0.1  # turns in the time of a gait cycle
 _LONGEST = 1.5  # times the time of the commanded turns, for slower ones
 
 
-@attrs.frozen(eq=False)
-class Walk:
-    """The last turns at the commanded cadence.
-
-    Attributes
-    ----------
-    turns : int
-        Number of turns, at most `MOST_TURNS`.
-    why : str
-        Why there are no turns; empty if there are some.
-    crank, torque : Series
-        Crank angle up to the unknown zero, counted on over turns [rad], and drive torque [N m] meanwhile.
-    """
-
-    turns: int
-    why: str
-    crank: Series
-    torque: Series
-
-    def newest(self, turns: int) -> "Walk":
-        """Its newest turns."""
-        to_go = np.abs(self.crank.value[-1] - self.crank.value) / TURN
-        first = int(np.flatnonzero(to_go >= turns)[-1])
-        return _from(self.crank.time_s[first], turns, self.crank, self.torque)
-
-
-def last_walk(samples: Samples, cadence: Cadence, longest_gap_s: float) -> Walk:
-    """The last walk among samples in any order.
-
-    Parameters
-    ----------
-    samples : (n,) array of GAIT_SAMPLE
-    cadence : Cadence
-    longest_gap_s : float
-        Between crank samples of a turn.
-    """
-    sound = samples[is_valid(samples)]
-    origin_ns = int(np.median(sound["stamp_ns"])) if len(sound) else 0
-    longest_ns = int(_LONGEST * MOST_TURNS * 60.0e9 / abs(cadence.commanded_rpm))
-    sound = sound[np.abs(sound["stamp_ns"] - origin_ns) <= longest_ns]  # stray stamps are left out
-    crank = _series(of_crank(sound), "crank_angle_rad", origin_ns)
-    crank = attrs.evolve(crank, value=np.asarray(np.unwrap(crank.value)))
-    first, turns, why = _turns(crank, cadence, longest_gap_s)
-    is_possible = np.abs(sound["torque_nm"]) <= KINDS[TORQUE].largest
-    torque = _series(sound[is_possible], "torque_nm", origin_ns)
-    return _from(crank.time_s[first], turns, crank, torque) if turns else Walk(0, why, crank, torque)
-
-
-def _from(begin_s: float, turns: int, crank: Series, torque: Series) -> Walk:
-    walked = (torque.time_s >= begin_s) & (torque.time_s <= crank.time_s[-1])
-    return Walk(turns, "", _part(crank, crank.time_s >= begin_s), _part(torque, walked))
-
-
 def _series(samples: Samples, name: str, origin_ns: int) -> Series:
     return series(samples["stamp_ns"], samples[name], np.zeros(len(samples), np.int64), origin_ns)
 
 
-def _part(whole: Series, which: NDArray[np.bool_]) -> Series:
+def _part(whole: Series, which: Flags) -> Series:
     return Series(whole.time_s[which], whole.value[which], whole.recording[which])
 
 
-def _turns(crank: Series, cadence: Cadence, longest_gap_s: float) -> tuple[int, int, str]:
-    """Index of the first sample of the last turns, their number, and why there are none."""
-    if not len(crank.value):
-        return 0, 0, "no crank sample can be used"
-    time_s, commanded = crank.time_s, cadence.commanded_rpm
+def _turns(crank: Series, cadence: Cadence) -> list[int]:
+    """Index of the last sample, and of the first one of each of the last turns at the commanded cadence."""
+    commanded, time_s = cadence.commanded_rpm, crank.time_s
     back: Floats = np.sign(commanded) * (crank.value[-1] - crank.value) / TURN  # turns until now
-    is_gap = np.diff(time_s, append=time_s[-1]) > longest_gap_s
-    end, turns = len(time_s) - 1, 0
-    while turns < MOST_TURNS:
-        before = np.flatnonzero(back[: end + 1] >= turns + 1.0)
+    is_gap, begins = np.diff(time_s, append=time_s[-1]) > BRIDGE_LIMIT_S, [len(time_s) - 1]
+    while len(begins) <= MOST_TURNS:
+        end, before = begins[-1], np.flatnonzero(back[: begins[-1] + 1] >= len(begins))
         if not len(before) or is_gap[before[-1] : end].any():
             break
-        rpm = float(np.sign(commanded)) * 60.0 / float(time_s[end] - time_s[before[-1]])
+        rpm = math.copysign(60.0, commanded) / float(time_s[end] - time_s[before[-1]])
         if abs(rpm - commanded) > cadence.tolerance_rpm:
             break
-        end, turns = int(before[-1]), turns + 1
-    return end, turns, "" if turns else _why_none(crank, cadence)
+        begins.append(int(before[-1]))
+    return begins
 
 
 def _why_none(crank: Series, cadence: Cadence) -> str:
@@ -400,87 +327,61 @@ class Zero:
     mismatch: float
 
 
-def zero_of(walk: Walk, model: TorqueModel, sampling: str) -> Zero | str:
-    """The crank's zero from a walk of at least `LEAST_TURNS`; else why it cannot be found.
+def zero_of(crank: Series, torque: Series, turns: int, model: TorqueModel, sampling: str) -> Zero | str:
+    """The crank's zero from some turns at the commanded cadence; else why it cannot be found.
 
     Parameters
     ----------
-    walk : Walk
+    crank, torque : Series
+        Crank angle up to the unknown zero, counted on over turns [rad], and drive torque [N m] meanwhile.
+    turns : int
     model : TorqueModel
     sampling : str
         Value of `drive_torque.sampling`.
     """
-    found = len(walk.torque.value)
+    found = len(torque.value)
     if not found:
         return "there is no drive torque"
-    if found < _LEAST_SAMPLES * walk.turns:
-        return (
-            f"the drive torque has {found} samples in {walk.turns} turns. Expected {_LEAST_SAMPLES} per turn"
-        )
-    pair = paired(motion_of(walk.crank), walk.torque)
+    if found < _LEAST_SAMPLES * turns:
+        return f"the drive torque has {found} samples in {turns} turns. Expected {_LEAST_SAMPLES} per turn"
+    pair = paired(motion_of(crank), torque)
     if len(pair.torque) < _LEAST_SAMPLES or not float(pair.torque.std()) > 0.0:
         return "the drive torque does not change"
-    fits = _fits(pair, walk.turns, model, 0.5 * pair.interval_s if sampling == AVERAGE else 0.0)
-    if not fits:
-        return "the drive torque does not fit this leg at any crank angle: see drive_torque.sign"
-    best = fits[0]
-    apart = [abs(math.remainder(_angle(one) - _angle(best), TURN)) for one in fits]
-    rivals = [one for one, angle in zip(fits, apart, strict=True) if angle > _APART_RAD]
-    doubt = _doubt(best, rivals)
-    if doubt:
-        return doubt
-    return Zero(
-        offset_rad=round(_angle(best), _DIGITS),
-        sigma_rad=round(math.hypot(best.sigma["offset_rad"], PHASE_ERROR_RAD), _DIGITS),
-        turns=walk.turns,
-        mismatch=best.mismatch,
-    )
-
-
-def _fits(pair: Pair, turns: int, model: TorqueModel, lag_s: float) -> list[torque_fit.Fit]:
-    """Fits near the phases that explain most, with the configured sign, the best first."""
-    start = Start(ratio=1.0, offset_rad=0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
+    # phases that explain most, with the configured sign
+    lag_s = 0.5 * pair.interval_s if sampling == AVERAGE else 0.0
+    start = torque_fit.Start(1.0, 0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
     middle = float(np.median(pair.position_rad))
-    terms = torque_fit.Terms(ratio=False, load=bool(model.load.any()))  # the foot may be on the ground
     few = pair.part(slice(None, None, max(1, len(pair.torque) // (_SCANNED * turns))))
-    starts = [
-        attrs.evolve(start, offset_rad=phase - middle)
-        for phase in _peaks(torque_fit.explained_by_phase(few, model, start, middle))
-    ]
-    fits = [torque_fit.fit(pair, model, one, terms) for one in starts]
-    fits = sorted((one for one in fits if one.gain > 0.0), key=lambda one: one.mismatch)
-    return [torque_fit.fit(pair, model, one.refined, terms, with_errors=True) for one in fits[:1]] + fits[1:]
-
-
-def _peaks(explained: Floats) -> list[float]:
-    """Phases [rad] of the largest local maxima above 0."""
+    explained = torque_fit.explained_by_phase(few, model, start, middle)
     is_peak = (explained > np.roll(explained, 1)) & (explained >= np.roll(explained, -1)) & (explained > 0.0)
     peaks = np.flatnonzero(is_peak)
-    best = peaks[np.argsort(-explained[peaks], kind="stable")][:_STARTS]
-    return [float(phase) for phase in best * (TURN / torque_fit.PHASES)]
-
-
-def _angle(one: torque_fit.Fit) -> float:
-    """Crank angle at joint position 0 [rad]."""
-    return one.offset_rad[0]
-
-
-def _doubt(best: torque_fit.Fit, rivals: list[torque_fit.Fit]) -> str:
-    """Reason why the best fit may be wrong; empty if it is certain."""
+    peaks = peaks[np.argsort(-explained[peaks], kind="stable")][:_STARTS]
+    # fits near these phases, the best first; the foot may be on the ground
+    terms = torque_fit.Terms(ratio=False, load=bool(model.load.any()))
+    starts = [attrs.evolve(start, offset_rad=float(at) * TURN / torque_fit.PHASES - middle) for at in peaks]
+    fits = [torque_fit.fit(pair, model, one, terms) for one in starts]
+    fits = sorted((one for one in fits if one.gain > 0.0), key=lambda one: one.mismatch)
+    if not fits:
+        return "the drive torque does not fit this leg at any crank angle: see drive_torque.sign"
+    best = torque_fit.fit(pair, model, fits[0].refined, terms, with_errors=True)
+    offset_rad, sigma_rad = best.offset_rad[0], best.sigma["offset_rad"]
+    # reasons why the best fit may be wrong
     if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
         return (
             f"the drive torque does not fit this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
             f"its RMS remain unexplained"
         )
-    if rivals and torque_fit.too_alike(best, rivals[0]):
+    rivals = (one for one in fits if abs(math.remainder(one.offset_rad[0] - offset_rad, TURN)) > _APART_RAD)
+    rival = next(rivals, None)
+    if rival and torque_fit.too_alike(best, rival):
         return (
-            f"{_angle(best):.2f} and {_angle(rivals[0]):.2f} rad explain "
-            "the drive torque almost equally well "
-            f"(mismatch {best.mismatch:.2f} and {rivals[0].mismatch:.2f})"
+            f"{offset_rad:.2f} and {rival.offset_rad[0]:.2f} rad explain the drive torque almost equally "
+            f"well (mismatch {best.mismatch:.2f} and {rival.mismatch:.2f})"
         )
-    if best.sigma["offset_rad"] > _SURE_RAD:
+    if sigma_rad > _SURE_RAD:
         return (
-            f"the drive torque scatters: the zero is uncertain by {best.sigma['offset_rad']:.2g} rad. "
+            f"the drive torque scatters: the zero is uncertain by {sigma_rad:.2g} rad. "
             f"Expected {_SURE_RAD:g} rad"
         )
-    return ""
+    sigma_rad = math.hypot(sigma_rad, PHASE_ERROR_RAD)
+    return Zero(round(offset_rad, _DIGITS), round(sigma_rad, _DIGITS), turns, best.mismatch)

@@ -29,10 +29,10 @@ SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corre
 _WHOLE = 1.4
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-# for a leg that differs from its reference, where two strange steps are no change, and for a leg on the
-# ground: five gait cycles tell whether its load has changed
+# for a leg that differs from its reference, because two unusual steps are not a change, and for a leg on the
+# ground, because five gait cycles tell whether its load has changed
 _LEAST_CYCLES_UNLIKE = 6
-_FIT_EVERY = 10  # gait cycles, but for the first ones of a change
+_FIT_EVERY = 10  # gait cycles, except for the first cycles of a change
 
 # times the detector's threshold (both are natural logarithms of odds), from which on it hardly matters that
 # the first cycles of a change were selected by their detection. Four cycles of J at 0.55 mm under 300 N gave

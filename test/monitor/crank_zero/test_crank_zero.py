@@ -16,8 +16,8 @@ SECOND = 10**9
 
 
 def off_rad(search: CrankZero, zero_rad: float) -> float:
-    assert search.state.zero is not None, search.cause
-    return abs(math.remainder(search.state.zero.offset_rad - zero_rad, math.tau))
+    assert search.zero is not None, search.cause
+    return abs(math.remainder(search.zero.offset_rad - zero_rad, math.tau))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -30,12 +30,12 @@ def test_it_is_found_within_four_turns_and_no_sample_is_lost(seed: int, walk, ne
     search = new_search(float(round(rpm)))
     passed = feed(search, sent)
     assert off_rad(search, zero) < TOLERANCE_RAD
-    assert search.state.zero is not None
-    assert search.state.zero.turns == LEAST_TURNS
-    assert search.state.zero.sigma_rad >= TOLERANCE_RAD  # clearances shift the phase by as much
+    assert search.zero is not None
+    assert search.zero.turns == LEAST_TURNS
+    assert search.zero.sigma_rad >= TOLERANCE_RAD  # clearances shift the phase by as much
     assert search.cause == ""
     assert search.unmonitored_s == 0.0
-    sent["crank_angle_rad"] += search.state.zero.offset_rad
+    sent["crank_angle_rad"] += search.zero.offset_rad
     assert passed.tobytes() == sent.tobytes()
 
 
@@ -48,7 +48,7 @@ def test_it_does_not_depend_on_blocks(stop: int, cuts: tuple[int, ...], walk, ne
     begun = feed(parts, sent[:stop], cuts, periods)
     rest = feed(parts, sent[stop:], (), periods)
     assert np.concatenate([begun, rest]).tobytes() == expected.tobytes()
-    assert (parts.state.zero, parts.cause) == (whole.state.zero, whole.cause)
+    assert (parts.zero, parts.cause) == (whole.zero, whole.cause)
     assert parts.unmonitored_s == whole.unmonitored_s
 
 
@@ -101,7 +101,7 @@ def test_where_it_cannot_be_told_it_is_said_why_and_found_later(name: str, walk,
     search = new_search(rpm)
     periods = EvaluationPeriods(SECOND // A_CYCLE)
     assert not len(feed(search, change(walk(4.5, 1.0)), (), periods))
-    assert search.state.zero is None
+    assert search.zero is None
     assert any(each in search.cause for each in why.split("|")), search.cause
     if rpm == 60.0:
         feed(search, walk(7.0, 1.0, begin_s=4.5), (), periods)
@@ -112,7 +112,7 @@ def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(walk, new_
     search = new_search()
     periods = EvaluationPeriods(SECOND // A_CYCLE)
     feed(search, without_torque(walk(40.0, 1.0)), (), periods)
-    held = sum(len(part) for part in search.state.waiting)
+    held = sum(len(part) for part in search.waiting)
     assert held <= 21 * 200
     assert search.unmonitored_s == pytest.approx(40.0, abs=0.1)
     passed = feed(search, walk(8.0, 1.0, begin_s=40.0), (), periods)
@@ -127,7 +127,7 @@ def test_an_encoder_that_restarts_is_found_again(pause_s: float, walk, new_searc
     truths = walk(4.0, 0.0), walk(4.0, 0.0, begin_s=4.0 + pause_s, seed=1)
     search = new_search()
     passed = feed(search, np.concatenate([first, second]))
-    assert search.state.times_found == 2
+    assert search.times_found == 2
     assert off_rad(search, -2.2) < TOLERANCE_RAD
     # none of the second boot has the zero of the first
     crank, truth = (
@@ -143,7 +143,7 @@ def test_a_gap_in_which_a_counting_encoder_counted_on_changes_nothing(walk, new_
     time_s = 1.0e-9 * (whole["stamp_ns"] - whole["stamp_ns"][0])
     search = new_search()
     passed = feed(search, whole[(time_s < 10.0) | (time_s > 10.8)])
-    assert search.state.times_found == 1
+    assert search.times_found == 1
     assert len(passed) == len(whole) - np.count_nonzero((time_s >= 10.0) & (time_s <= 10.8))
 
 
@@ -154,7 +154,7 @@ def test_a_glitch_is_no_restart(number: int, walk, new_search, feed) -> None:
     sent["crank_angle_rad"][wrong] += 2.0
     search = new_search()
     passed = feed(search, sent)
-    assert search.state.times_found == 1
+    assert search.times_found == 1
     assert len(passed) == len(sent)
 
 
@@ -166,4 +166,4 @@ def test_an_angle_that_goes_nowhere_is_not_waited_for(walk, new_search, feed) ->
     search = new_search()
     feed(search, sent)
     assert search.cause
-    assert sum(len(part) for part in search.state.waiting) < 1000
+    assert sum(len(part) for part in search.waiting) < 1000

@@ -163,11 +163,15 @@ class Explanation(NamedCause):
         Minus twice the logarithm of its likelihood, less a constant.
     square : float
         Mean square of its residual, in units of the covariance: about 1 if the cause is right.
+    is_least : bool
+        True if one of several joints is as little open as the search tries: an error of the model may explain
+        as well.
     """
 
     counted: float
     misfit: float
     square: float
+    is_least: bool = False
 
     def explains(self, without: float) -> bool:
         """True if a leg can have this cause and it explains the measured signature.
@@ -335,6 +339,7 @@ class Explainer:
             counted=float(modelled_m[self.joints.index(widest.subject)]),
             misfit=float(misfits.value[best]) + 2.0 * SURE_LOG_ODDS,  # the odds of a further cause
             square=square,
+            is_least=bool((sizes[best] <= least_m).any()),
         )
 
     def _of_sensor(self, seen: _Seen) -> list[Explanation]:
@@ -542,7 +547,10 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
             cause=Cause.UNKNOWN, since_ns=since_ns, value=0.0, sigma=0.0, counted=0.0, log_odds=log_odds
         )
     second = next(one for one in explanations if _is_rival(one, best))
-    runner_up = f"{second.cause.value} {second.subject}".strip()
+    runner_up = "as modelled" if second is nothing else f"{second.cause.value} {second.subject}".strip()
+    runner_up_log_odds = 0.5 * (second.misfit - best.misfit) / max(1.0, best.square)
+    if best.is_least:
+        runner_up, runner_up_log_odds = _ANYTHING_ELSE, 0.0
     return Change(
         cause=best.cause,
         subject=best.subject,
@@ -552,8 +560,8 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         sigma=best.sigma,
         counted=best.counted,
         log_odds=log_odds,
-        runner_up="as modelled" if second is nothing else runner_up,
-        runner_up_log_odds=0.5 * (second.misfit - best.misfit) / max(1.0, best.square),
+        runner_up=runner_up,
+        runner_up_log_odds=runner_up_log_odds,
     )
 
 

@@ -92,6 +92,15 @@ def test_two_joints_that_open_at_once_are_named_together(torque_of, table) -> No
         assert summary.clearances[joint].change_m > 5.0e-5
 
 
+def test_two_joints_that_cannot_be_told_apart_are_not_one_joint(torque_of, table) -> None:
+    """G at 0.461 mm was named alone, before pairs were compared with their interaction (2026-11-29)."""
+    walk = table(torque_of(TAKEN), torque_of(TAKEN, G=4.5e-4, J=4.5e-4))
+    summary = lw.replay(walk).summary()
+    assert (summary.verdict.state.value, summary.diagnosis.cause) == ("inspect", "several")
+    assert len(summary.verdict.joints) > 1
+    assert all(clearance.estimated_by == () for clearance in summary.clearances.values())
+
+
 def late(walk: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """A walk whose torque comes 10 ms late."""
     return {**walk, "drive_torque": np.interp(walk["time"] - 0.01, walk["time"], walk["drive_torque"])}

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.body_torques import at_speed, body_torques
 from leg_wear_monitor.estimate.cause import (
     SURE_LOG_ODDS,
     SURE_OF_NAME,
@@ -23,6 +22,7 @@ from leg_wear_monitor.estimate.cause import (
     beyond_friction,
 )
 from leg_wear_monitor.estimate.least_squares import solved
+from leg_wear_monitor.estimate.torque_model import at_speed, body_torques
 from leg_wear_monitor.mechanism.arrays import Complex, Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -5,7 +5,6 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.explanations import (
     Baseline,
@@ -21,6 +20,7 @@ from leg_wear_monitor.estimate.signature import (
     signature_model,
     simulated_signatures,
 )
+from leg_wear_monitor.estimate.torque_model import body_torques
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.estimate.body_torques import body_torques, torque_coefficients
 from leg_wear_monitor.estimate.drive import Channel
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.signature import (
@@ -22,6 +21,7 @@ from leg_wear_monitor.estimate.signature import (
     simulated_signatures,
     without_scatter,
 )
+from leg_wear_monitor.estimate.torque_model import body_torques, torque_coefficients
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, one_cycle
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters

@@ -13,7 +13,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate import identification, signature
-from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.change_detector import ChangeDetector
 from leg_wear_monitor.estimate.channel import with_channel_of
 from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, DriveFigures
@@ -21,6 +20,7 @@ from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
 from leg_wear_monitor.estimate.identification import misfit
 from leg_wear_monitor.estimate.leg_model import compared_with, explainer_of, nuisances
+from leg_wear_monitor.estimate.torque_model import body_torques
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -130,8 +130,8 @@ def test_the_terminal_names_the_guide_of_the_code(bag: Replayed) -> None:
 
 
 def test_the_terminal_gives_no_number_that_the_verdict_does_not_believe(bag: Replayed) -> None:
-    (row,) = (line for line in bag.printed.splitlines() if line.startswith("A (hip, drive side)  "))
-    clearance, _, p10, p50, *_ = re.split(r"\s{2,}", row)[1:]
+    row = r"^A \(hip, drive side\) +(\S+(?: ± \S+)?) +\S+ +(\S+) +(\S+) "
+    ((clearance, p10, p50),) = re.findall(row, bag.printed, re.MULTILINE)
     known, life = bag.found["clearances"]["A"], bag.found["life"]["A"]
     best_estimate_m, sigma_m = known["best_estimate_m"], known["best_estimate_sigma_m"]
     if best_estimate_m is None:

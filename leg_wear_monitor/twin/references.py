@@ -36,7 +36,9 @@ from leg_wear_monitor.twin.reference import (
 
 CADENCES = 6  # number of cadences whose references are stored
 
-CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
+# simulated for a leg; twice as many for the expected leg, and half as many for a leg that is far from it
+CYCLES = 20
+_FAR = 2.5  # factor on a clearance whose effect is large against the scatter of the simulated gait cycles
 
 _PERIODS = 4  # evaluation periods in a commanded gait cycle
 # number per evaluation period, a quarter of a gait cycle; a core could simulate 1.5 times as many
@@ -373,7 +375,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     ) -> None:
         """Begin the leg with given parameters, then legs in which all of them are changed, as in `design`."""
         expected = np.maximum(clearance_m, LEAST_CLEARANCE_M)
-        self._begin_legs([(one, expected) for one in _changed(near)], depth, profile)
+        self._begin_legs([(one, expected) for one in _changed(near)], depth, profile, are_near=True)
 
     def go_on(self, part: TorqueReference, depth: Floats) -> None:
         """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
@@ -391,7 +393,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
             parameters = [own] * (1 + part.of_joints.size)
             parameters += _of_factors(own) if part.of_frictions.size else []
         legs = list(zip(parameters, part.clearance_m, strict=True))
-        self._begin_legs(legs, depth, part.profile, part.torque_nm)
+        self._begin_legs(legs, depth, part.profile, part.torque_nm, part.is_of_parameters)
 
     def _begin_legs(
         self,
@@ -399,8 +401,11 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
         depth: Floats,
         profile: CrankProfile,
         done: Sequence[HalfFloats] = (),
+        are_near: bool = False,
     ) -> None:
-        cycles = [2 * self._cycles, *([self._cycles] * (len(legs) - 1))]
+        (own, expected), *others = legs
+        near = [are_near or (one is own and (wider <= _FAR * expected).all()) for one, wider in others]
+        cycles = [2 * self._cycles, *(self._cycles if each else -(-self._cycles // 2) for each in near)]
         self._begin([Leg(*leg, n) for leg, n in zip(legs, cycles, strict=True)], depth, profile, done)
 
     @property

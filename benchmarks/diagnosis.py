@@ -288,10 +288,12 @@ def counted(explainer: Explainer) -> np.ndarray:
     return np.full(len(explainer.joints), NEW_M)
 
 
-def named(explainer: Explainer, mean: np.ndarray, cycles: int) -> str:
-    """The best cause, in words."""
+def named(explainer: Explainer, mean: np.ndarray, cycles: int) -> set[str]:
+    """The joints of the best cause, or the cause in words."""
     best = explainer.explanations(mean, cycles, counted(explainer))[0]
-    return best.subject if best.cause is Cause.CLEARANCE else best.cause.value
+    if best.cause in (Cause.CLEARANCE, Cause.SEVERAL):
+        return {one.subject for one in best.joints or (best,)}
+    return {best.cause.value}
 
 
 def fitted(explainer: Explainer, mean: np.ndarray, cycles: int):
@@ -312,9 +314,9 @@ def delays(detector: ChangeDetector, cycles: np.ndarray) -> str:
 
 
 def rightly(explainer: Explainer, cycles: np.ndarray, n: int, wide: list[str]) -> tuple[int, int]:
-    """How many windows of n cycles name a joint that is wide, and how many there are."""
+    """How many windows of n cycles name wide joints alone, and how many there are."""
     parts = [cycles[i : i + n].mean(axis=0) for i in range(0, len(cycles) - n + 1, n)]
-    return sum(named(explainer, part, n) in wide for part in parts), len(parts)
+    return sum(named(explainer, part, n) <= set(wide) for part in parts), len(parts)
 
 
 def of(found: tuple[int, int]) -> str:

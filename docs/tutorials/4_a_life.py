@@ -90,7 +90,7 @@ print("remaining life: p10 {:.0f} h, p50 {:.0f} h, p90 {:.0f} h".format(*before)
 
 now_ns = int(counted.history.stamp_ns[-1])
 found = monitor.measure("A", clearance_m=0.000325, sigma_m=2e-6, stamp_ns=now_ns, who="you")
-print(found.words[0])
+print(found.lines[0])
 
 after = hours_left(monitor.renew_forecast().joints[0].forecast)
 print("remaining life: p10 {:.0f} h, p50 {:.0f} h, p90 {:.0f} h".format(*after))

@@ -59,6 +59,6 @@ def test_a_reference_is_written_beside_the_parameters_that_name_it(run, tmp_path
 
 
 def test_an_unknown_crank_is_named_with_the_joints_that_there_are(refused) -> None:
-    assert "'knee' is not a joint of the recording, it has crank" in refused(
+    assert "'knee' is not a joint of the recording, which has crank" in refused(
         "commission", HEALTHY, "--crank-joint", "knee"
     )

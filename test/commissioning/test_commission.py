@@ -302,7 +302,7 @@ def test_a_torque_that_looks_the_same_mirrored_and_noise_are_not_enough_to_tell(
         (lambda walk: {"torque_nm": 0.0 * walk.torque_nm}, 0.0, None, "no torque changes"),
         (lambda walk: {"torque_nm": 0.0 * walk.torque_nm + 3.7}, 0.0, None, "no torque changes"),
         (lambda walk: {"torque_nm": 1.0e-308 * walk.torque_nm}, 0.0, None, "no torque changes"),
-        (lambda walk: {}, 0.1, "hip", "'hip' is not a joint of the recording, it has crank"),
+        (lambda walk: {}, 0.1, "hip", "'hip' is not a joint of the recording, which has crank"),
     ],
     ids=[
         "it is short",

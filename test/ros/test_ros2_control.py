@@ -156,7 +156,7 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
     box = inputs.Inbox(Decoder(config), 10)
     has_no = "leg_crank has no interface"
     for joint, there, report in (
-        ("hip", {"effort": 1.0}, "no joint is named 'leg_crank'; there are hip"),
+        ("hip", {"effort": 1.0}, "no joint is named 'leg_crank'; the joints are hip"),
         (
             "leg_crank",
             {"effort": 1.0, "position": 2.0},

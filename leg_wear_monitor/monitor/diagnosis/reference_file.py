@@ -15,11 +15,11 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
-from leg_wear_monitor.twin.reference import COUPLING_DAMPING, HARMONICS, POINTS, CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import HARMONICS, POINTS, CrankProfile, LegParameters
 from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
 
-FORMAT = 2  # 1, without a number, had one reference of a leg as its file is
+FORMAT = 3  # 2 had the same number of gait cycles for all legs but the first
 
 _LOAD_SIGMA = 0.05  # relative error of a given force: a sensor's mean over some steps
 
@@ -121,8 +121,8 @@ def write_references(file: IO[bytes], mechanism: Mechanism, references: Sequence
             f"load_n_{i}": one.parameters.load,
             f"load_sigma_{i}": one.parameters.load_sigma,
             f"clearance_m_{i}": one.clearance_m,
-            f"expected_torque_nm_{i}": one.torque_nm[0],
-            f"torque_nm_{i}": np.stack(one.torque_nm[1:]),
+            f"cycles_{i}": [len(torque) for torque in one.torque_nm],
+            f"torque_nm_{i}": np.concatenate(one.torque_nm),
         }
     np.savez_compressed(file, **parts)
 
@@ -177,29 +177,28 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
 def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
     """Reference number i of an archive; raises ValueError for impossible values."""
     clearance_m = _checked(parts, f"clearance_m_{i}", (None, joints))
-    torque = _checked(parts, f"torque_nm_{i}", (len(clearance_m) - 1, None, POINTS))
-    expected = _checked(parts, f"expected_torque_nm_{i}", (None, POINTS))
+    ends, torque = np.cumsum(parts[f"cycles_{i}"]), _checked(parts, f"torque_nm_{i}", (None, POINTS))
+    if len(ends) != len(clearance_m) or ends[0] < 1 or ends[-1] != len(torque) or (np.diff(ends) < 1).any():
+        raise ValueError(f"cycles_{i} does not divide torque_nm_{i} among {len(clearance_m)} legs")
     cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
     mass, length = (_checked(parts, f"{name}_{i}", (bodies,)) for name in ("mass", "length"))
-    friction, speed = (float(_checked(parts, f"{name}_{i}", ())) for name in ("friction", "speed_radps"))
-    compliance, damping = 0.0, COUPLING_DAMPING  # files from before drives could be compliant are without
-    if f"damping_ratio_{i}" in parts:
-        compliance = float(_checked(parts, f"compliance_rad_per_nm_{i}", ()))
-        damping = float(_checked(parts, f"damping_ratio_{i}", ()))
-    load, load_sigma = np.zeros((0, 2)), 0.0  # files from before a leg could walk on the ground are without
-    if f"load_n_{i}" in parts and parts[f"load_n_{i}"].size:
-        load = _checked(parts, f"load_n_{i}", (None, 2))
-    if f"load_sigma_{i}" in parts:
-        load_sigma = float(_checked(parts, f"load_sigma_{i}", ()))
+    numbers = ("friction", "speed_radps", "compliance_rad_per_nm", "damping_ratio", "load_sigma")
+    friction, speed, compliance, damping, load_sigma = (
+        float(_checked(parts, f"{name}_{i}", ())) for name in numbers
+    )
+    load = parts[f"load_n_{i}"]  # none in the air
+    load = _checked(parts, f"load_n_{i}", (None, 2)) if load.size else np.zeros((0, 2))
     for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
         if not (values > 0.0).all():
             raise ValueError(f"a {name} is not above 0")
     if min(friction, compliance, damping, load_sigma) < 0.0 or speed == 0.0:
         raise ValueError("friction, compliance, damping or a sigma is below 0, or speed is 0")
     leg = LegParameters(mass, length, friction, compliance, damping, load, load_sigma)
-    found = TorqueReference(CrankProfile(speed, cosine, sine), clearance_m, (expected, *torque), leg)
-    if (len(torque) - found.of_masses.size - found.of_frictions.size) % joints:
-        raise ValueError(f"its {len(torque)} other legs are not the same number for each of {joints} joints")
+    profile, torque_nm = CrankProfile(speed, cosine, sine), tuple(np.split(torque, ends[:-1]))
+    found = TorqueReference(profile, clearance_m, torque_nm, leg)
+    others = len(ends) - 1 - found.of_masses.size - found.of_frictions.size
+    if others % joints:
+        raise ValueError(f"its {others} wider legs are not the same number for each of {joints} joints")
     return found
 
 

@@ -160,13 +160,13 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
         (
             "leg_crank",
             {"effort": 1.0, "position": 2.0},
-            f"{has_no} 'motor_current' and 'motor_temperature', it has effort, position; "
+            f"{has_no} 'motor_current' and 'motor_temperature'. It has effort, position; "
             "set drive_torque.interface and drive.temperature_interface",
         ),
         (
             "leg_crank",
             {"motor_current": 1.0},
-            f"{has_no} 'motor_temperature', it has motor_current; set drive.temperature_interface",
+            f"{has_no} 'motor_temperature'. It has motor_current; set drive.temperature_interface",
         ),
         (
             "leg_crank",

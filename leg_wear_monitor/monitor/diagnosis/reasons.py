@@ -148,15 +148,15 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     if references.is_busy:
         left_s = references.cycles_left * commanded_s
         then = "; then a reference with these values is simulated" if state.is_identifying else ""
-        return f"{_simulated(state)} ready in {_cycles(left_s / cycle_s, cycle_s)}{then}"
+        return f"{_simulated(state)} ready after {_cycles(left_s / cycle_s, cycle_s)}{then}"
     if state.reference is None:
-        return f"a reference will be chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
+        return f"a reference will be chosen after {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
     if state.is_elsewhere:
         left = UNLIKE_CYCLES - len(state.waiting)
-        return "" if _is_changing(state) else f"its reference will be started in {_cycles(left, cycle_s)}"
+        return "" if _is_changing(state) else f"its reference will be started after {_cycles(left, cycle_s)}"
     if state.commissioned is None and not state.changes:
         left = COMMISSIONING_CYCLES - len(state.cycles)
-        return f"a baseline for smaller changes will be complete in {_cycles(left, cycle_s)}"
+        return f"a baseline for smaller changes will be complete after {_cycles(left, cycle_s)}"
     return ""
 
 
@@ -168,6 +168,6 @@ def _simulated(state: TorqueState) -> str:
 
 
 def _cycles(number: float, cycle_s: float) -> str:
-    """A number of gait cycles, and the time that they take."""
+    """A number of further gait cycles, and the time that they take."""
     whole = max(1, math.ceil(number))
-    return f"{whole} gait cycle{'s' if whole > 1 else ''} ({whole * cycle_s:.0f} s)"
+    return f"{whole} more gait cycle{'s' if whole > 1 else ''} ({whole * cycle_s:.0f} s of walking)"

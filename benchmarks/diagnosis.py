@@ -29,18 +29,17 @@ from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import TORQUE, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
-from leg_wear_monitor.estimate.clearance_fit import best_fit
+from leg_wear_monitor.estimate.clearance_fit import ChangeDetector, best_fit
 from leg_wear_monitor.estimate.explanations import Explainer
-from leg_wear_monitor.estimate.identification import (
+from leg_wear_monitor.estimate.leg_model import (
     FAR_FROM_FILE,
     ONLY_SCATTER,
     WORTH_IDENTIFYING,
+    explainer_of,
     identified_leg,
     leg_of_ideal_torque,
     misfit,
 )
-from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, signatures, with_noise_of
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace

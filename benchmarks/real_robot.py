@@ -34,7 +34,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, Change
-from leg_wear_monitor.estimate.change_detector import threshold
+from leg_wear_monitor.estimate.clearance_fit import threshold
 from leg_wear_monitor.estimate.explanations import Explainer, Nuisance, change_of
 from leg_wear_monitor.estimate.leg_model import commissioned_baseline, with_scatter_of
 from leg_wear_monitor.estimate.signature import (

@@ -7,8 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import Pair, is_steady, slow_speed
-from leg_wear_monitor.estimate.torque_fit import BINS, Fit, Terms, fit, repeating
-from leg_wear_monitor.estimate.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_model import BINS, Fit, Terms, TorqueModel, fit, repeating
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.twin.sample import AVERAGE, INSTANT

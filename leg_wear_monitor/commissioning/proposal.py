@@ -20,8 +20,7 @@ from leg_wear_monitor.commissioning.result import CommissioningItem as Item
 from leg_wear_monitor.commissioning.search import SAME_GEAR, Choice
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import JointMotion, with_repeating_acceleration
-from leg_wear_monitor.estimate.torque_fit import Fit, Terms, fit, repeating
-from leg_wear_monitor.estimate.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_model import Fit, Terms, TorqueModel, fit, repeating
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.estimate.joint_motion import JointMotion, Pair, Series, paired, steady_stretch
-from leg_wear_monitor.estimate.torque_fit import Fit, Start, fit, repeating, too_alike
-from leg_wear_monitor.estimate.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_model import Fit, Start, TorqueModel, fit, repeating, too_alike
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE

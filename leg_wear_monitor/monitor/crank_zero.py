@@ -11,9 +11,18 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate import torque_fit
 from leg_wear_monitor.estimate.joint_motion import Series, motion_of, paired, series
-from leg_wear_monitor.estimate.torque_model import PHASE_ERROR_RAD, TorqueModel
+from leg_wear_monitor.estimate.torque_model import (
+    PHASE_ERROR_RAD,
+    PHASES,
+    Start,
+    Terms,
+    TorqueModel,
+    explained_by_phase,
+    fit,
+    repeating,
+    too_alike,
+)
 from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.alarms import CRANK_ZERO
@@ -349,31 +358,31 @@ def zero_of(crank: Series, torque: Series, turns: int, model: TorqueModel, sampl
         return "the drive torque does not change"
     # phases that explain most, with the configured sign
     lag_s = 0.5 * pair.interval_s if sampling == AVERAGE else 0.0
-    start = torque_fit.Start(1.0, 0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
+    start = Start(1.0, 0.0, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
     middle = float(np.median(pair.position_rad))
     few = pair.part(slice(None, None, max(1, len(pair.torque) // (_SCANNED * turns))))
-    explained = torque_fit.explained_by_phase(few, model, start, middle)
+    explained = explained_by_phase(few, model, start, middle)
     is_peak = (explained > np.roll(explained, 1)) & (explained >= np.roll(explained, -1)) & (explained > 0.0)
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[np.argsort(-explained[peaks], kind="stable")][:_STARTS]
     # fits near these phases, the best first; the foot may be on the ground
-    terms = torque_fit.Terms(ratio=False, load=bool(model.load.any()))
-    starts = [attrs.evolve(start, offset_rad=float(at) * TURN / torque_fit.PHASES - middle) for at in peaks]
-    fits = [torque_fit.fit(pair, model, one, terms) for one in starts]
+    terms = Terms(ratio=False, load=bool(model.load.any()))
+    starts = [attrs.evolve(start, offset_rad=float(at) * TURN / PHASES - middle) for at in peaks]
+    fits = [fit(pair, model, one, terms) for one in starts]
     fits = sorted((one for one in fits if one.gain > 0.0), key=lambda one: one.mismatch)
     if not fits:
         return "the drive torque does not fit this leg at any crank angle: see drive_torque.sign"
-    best = torque_fit.fit(pair, model, fits[0].refined, terms, with_errors=True)
+    best = fit(pair, model, fits[0].refined, terms, with_errors=True)
     offset_rad, sigma_rad = best.offset_rad[0], best.sigma["offset_rad"]
     # reasons why the best fit may be wrong
-    if best.mismatch > _UNLIKE or torque_fit.repeating(best) > _ANOTHER_LEG:
+    if best.mismatch > _UNLIKE or repeating(best) > _ANOTHER_LEG:
         return (
             f"the drive torque does not fit this leg at any crank angle, {100.0 * best.mismatch:.0f} % of "
             f"its RMS remain unexplained"
         )
     rivals = (one for one in fits if abs(math.remainder(one.offset_rad[0] - offset_rad, TURN)) > _APART_RAD)
     rival = next(rivals, None)
-    if rival and torque_fit.too_alike(best, rival):
+    if rival and too_alike(best, rival):
         return (
             f"{offset_rad:.2f} and {rival.offset_rad[0]:.2f} rad explain the drive torque almost equally "
             f"well (mismatch {best.mismatch:.2f} and {rival.mismatch:.2f})"

@@ -12,8 +12,14 @@ from leg_wear_monitor.estimate.cause import (
     Cause,
     Change,
 )
-from leg_wear_monitor.estimate.change_detector import first_changed
-from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, best_fit, start_of, starts_of, with_rivals
+from leg_wear_monitor.estimate.clearance_fit import (
+    ClearanceFit,
+    best_fit,
+    first_changed,
+    start_of,
+    starts_of,
+    with_rivals,
+)
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.explanations import Explanation, change_of, with_doubt
 from leg_wear_monitor.estimate.signature import with_noise_of

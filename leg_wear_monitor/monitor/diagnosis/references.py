@@ -12,14 +12,23 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate import identification, signature
-from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate import signature
 from leg_wear_monitor.estimate.channel import with_channel_of
+from leg_wear_monitor.estimate.clearance_fit import ChangeDetector
 from leg_wear_monitor.estimate.drive import DIRECT, UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
-from leg_wear_monitor.estimate.identification import misfit
-from leg_wear_monitor.estimate.leg_model import compared_with, explainer_of, nuisances
+from leg_wear_monitor.estimate.leg_model import (
+    FAR_FROM_FILE,
+    ONLY_SCATTER,
+    WORTH_IDENTIFYING,
+    compared_with,
+    explainer_of,
+    identified_leg,
+    leg_of_ideal_torque,
+    misfit,
+    nuisances,
+)
 from leg_wear_monitor.estimate.torque_model import body_torques
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import build_linkage
@@ -332,7 +341,7 @@ class References:
         if is_known and self._models.is_of_file(state):
             return False
         is_unlike_file = state.rounds > 0 or known not in (None, none)
-        least = identification.ONLY_SCATTER if is_unlike_file else identification.WORTH_IDENTIFYING
+        least = ONLY_SCATTER if is_unlike_file else WORTH_IDENTIFYING
         return self._models.misfit(state) >= least
 
     def is_load_left_out(self, state: TorqueState) -> bool:
@@ -373,8 +382,8 @@ class References:
         start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
         state.rounds += 1
         clearance_m, profile, leg = known.clearance_m, reference.profile, self._mechanism
-        if is_first and not start.compliance and self._models.misfit(state) >= identification.FAR_FROM_FILE:
-            ideal = identification.leg_of_ideal_torque(leg, model, known, profile.speed, start.load)
+        if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
+            ideal = leg_of_ideal_torque(leg, model, known, profile.speed, start.load)
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
         state.is_identifying = True
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
@@ -465,7 +474,7 @@ class References:
             state.parameters = legs.parameters
         else:
             own = self._models.explainer(state)
-            found = identification.identified_leg(legs, own.model, own.nuisances, known)
+            found = identified_leg(legs, own.model, own.nuisances, known)
             if not found.is_possible(self._mechanism):
                 _abandon(state)
                 return

@@ -9,8 +9,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS, Cause, Change, TorqueExplanation
-from leg_wear_monitor.estimate.change_detector import DetectorState
-from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, DetectorState
 from leg_wear_monitor.estimate.drive import DIRECT, Channel
 from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor

@@ -6,8 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.estimate.change_detector import FACTORS, ChangeDetector, excess, threshold
-from leg_wear_monitor.estimate.clearance_fit import fit_clearances
+from leg_wear_monitor.estimate.clearance_fit import FACTORS, ChangeDetector, excess, fit_clearances, threshold
 from leg_wear_monitor.estimate.explanations import Baseline, Explainer
 from leg_wear_monitor.estimate.leg_model import commissioned_baseline, parts_left_out, with_scatter_of
 from leg_wear_monitor.estimate.signature import Changes, CommissionedTorque, SignatureModel, TorqueSensor

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.commissioning.commission import commission
-from leg_wear_monitor.commissioning.result import CommissioningResult
+from leg_wear_monitor.commissioning.proposal import CommissioningResult
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats

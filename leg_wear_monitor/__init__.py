@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from leg_wear_monitor.commissioning.commission import commission
-    from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
+    from leg_wear_monitor.commissioning.proposal import CommissioningItem, CommissioningResult
     from leg_wear_monitor.dynamics.result import (
         EnergyBalance,
         Impact,
@@ -52,8 +52,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BushingLife": "life.design",
-    "CommissioningItem": "commissioning.result",
-    "CommissioningResult": "commissioning.result",
+    "CommissioningItem": "commissioning.proposal",
+    "CommissioningResult": "commissioning.proposal",
     "Drive": "mechanism.materials",
     "Duty": "life.result",
     "EnergyBalance": "dynamics.result",

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.commissioning import proposal
-from leg_wear_monitor.commissioning.result import CommissioningItem, CommissioningResult
+from leg_wear_monitor.commissioning.proposal import CommissioningItem, CommissioningResult
 from leg_wear_monitor.commissioning.search import candidates, choose
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.estimate.joint_motion import JointMotion, Series, motion_of, why_not_a_crank
@@ -136,10 +136,7 @@ def propose(
 
 
 def _found(
-    signals: Signals,
-    base: MonitorConfig,
-    crank_joint: str | None,
-    model: TorqueModel,
+    signals: Signals, base: MonitorConfig, crank_joint: str | None, model: TorqueModel
 ) -> proposal.Found:
     """The best choice of joint, torque and gear, and the quality of its fit."""
     motions = _cranks(signals.joints, crank_joint)

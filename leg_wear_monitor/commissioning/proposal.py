@@ -1,11 +1,13 @@
-"""The proposed parameters with their intervals, and the parameters that a recording does not determine."""
+"""The result of commissioning: parameters with their intervals, their file, and undetermined parameters."""
 
 import math
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from io import StringIO
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
+from ruamel.yaml import YAML
 
 from leg_wear_monitor.commissioning.evidence import (
     Timing,
@@ -16,18 +18,186 @@ from leg_wear_monitor.commissioning.evidence import (
     timing_of,
     with_load,
 )
-from leg_wear_monitor.commissioning.result import CommissioningItem as Item
 from leg_wear_monitor.commissioning.search import SAME_GEAR, Choice
+from leg_wear_monitor.configuration import part_document
+from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.estimate.drive import DriveFigures
 from leg_wear_monitor.estimate.joint_motion import JointMotion, with_repeating_acceleration
 from leg_wear_monitor.estimate.torque_model import Fit, Terms, TorqueModel, fit, repeating
+from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH
+from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, nested, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
+from leg_wear_monitor.recordings.findings import Finding
+from leg_wear_monitor.twin.references import TorqueReference
 
-# The chosen fit again, with the terms that the recording determines and the lag to allow for.
+if TYPE_CHECKING:
+    import pandas as pd
 
+
+# The ROS parameter file: parameters that differ from the defaults, which `config/monitor.yaml` lists.
+
+
+_HEAD_LINES = (
+    "Parameters of the monitor, proposed by `leg-wear-monitor commission`; others have their defaults.",
+    "crank angle = sign * position / gear_ratio + offset_rad",
+    "torque on the crank = sign * scale * gear_ratio * value",
+)
+# parameters that are written even if they have their default, because a leg depends on them
+_ALWAYS_WRITTEN = ("mechanism", "crank_joint", "crank.", "drive_torque.", "cadence.")
+
+
+def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
+    """Text of a parameter file, with remarks as comments at its head."""
+    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD_LINES, *remarks))
+    written = {
+        name: value
+        for name, value in values_of(config).items()
+        if value != () and (value != PARAMETERS[name].default or name.startswith(_ALWAYS_WRITTEN))
+    }
+    stream = StringIO()
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.dump({"/**": {MARK: nested(written)}}, stream)
+    return head + stream.getvalue()
+
+
+# The result: each parameter with its second-best value, the undetermined parameters, and the quantities that
+# do not fit.
+
+
+SCHEMA_VERSION = 1
+
+
+@attrs.frozen(kw_only=True)
+class CommissioningItem:
+    """A quantity that commissioning determines.
+
+    Attributes
+    ----------
+    name : str
+        A parameter of the monitor, or another measured quantity.
+    value : str, int or float
+        NaN if it cannot be determined.
+    unit : str
+        Unit of the value; empty for a name or a ratio.
+    sigma : float, optional
+        Standard deviation, in the unit.
+    mismatch : float, optional
+        Torque residual: RMS of the torque that this value leaves unexplained, as a fraction of the torque's
+        RMS.
+    other : str, int, float or None
+        The runner-up.
+    other_mismatch : float, optional
+        Torque residual of the runner-up.
+    remark : str
+        Further information.
+    """
+
+    name: str
+    value: str | int | float
+    unit: str = ""
+    sigma: float | None = None
+    mismatch: float | None = None
+    other: str | int | float | None = None
+    other_mismatch: float | None = None
+    remark: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class CommissioningResult:
+    """Result of commissioning.
+
+    Attributes
+    ----------
+    items : tuple of CommissioningItem
+        The quantities, one by one.
+    not_told : tuple of str
+        Parameters that the recording does not determine, and why.
+    findings : tuple of str
+        Quantities that do not fit, and the remedy.
+    notes : tuple of str
+        Further information.
+    config : MonitorConfig or None
+        The proposed parameters; None if a choice between alternatives is not certain.
+    turns : float
+        Turns of the crank in the recording.
+    faults : tuple of Finding
+        Faults of the recordings, whose other parts were used.
+    reference : TorqueReference or None
+        Reference simulated for ``diagnosis.reference``, if it was requested.
+    """
+
+    items: tuple[CommissioningItem, ...]
+    not_told: tuple[str, ...]
+    findings: tuple[str, ...]
+    notes: tuple[str, ...]
+    config: MonitorConfig | None
+    turns: float
+    faults: tuple[Finding, ...] = ()
+    reference: TorqueReference | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """True if every parameter was determined, and everything fits."""
+        return self.config is not None and not self.not_told and not self.findings
+
+    @property
+    def remarks(self) -> list[str]:
+        """Parameters that are not determined, contradictions, and notes, one line each."""
+        labels = {"not determined": self.not_told, "does not fit": self.findings, "note": self.notes}
+        return [f"{label}: {text}" for label, texts in labels.items() for text in texts]
+
+    def item(self, name: str) -> CommissioningItem:
+        """The item of a name; raises KeyError if there is none."""
+        return {each.name: each for each in self.items}[name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object for JSON; null for a value that cannot be determined."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "turns": self.turns,
+            "is_sure": self.is_sure,
+            "items": part_document(self.items),
+            "not_enough_to_tell": list(self.not_told),
+            "findings": list(self.findings),
+            "notes": list(self.notes),
+        }
+
+    def to_json(self) -> str:
+        """Text of `to_dict`, as ``commission --json`` writes it."""
+        return json_text(self.to_dict())
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of the items, a row each.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        rows = [attrs.asdict(item) for item in self.items]
+        columns = {key: [row[key] for row in rows] for key in rows[0]}
+        return data_frame(columns, index="name")
+
+    def to_yaml(self) -> str:
+        """Parameter file of the monitor; uncertain parameters are comments at its head.
+
+        Raises
+        ------
+        LegWearError
+            If no parameters are proposed.
+        """
+        if self.config is None:
+            raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
+        return parameter_text(self.config, self.remarks)
+
+
+# The measured quantities: the chosen fit again, with the terms that the recording determines and the lag to
+# allow for.
 
 _AS_WELL = 1.02  # a fit is as good as the best fit up to this ratio of torque residuals
 # fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
@@ -175,17 +345,17 @@ _NEAR = 0.05  # relative error of the scale due to clearances; a given scale wit
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies for which a torque may be measured at the motor's shaft
 
 
-def items(found: Found) -> list[Item]:
+def items(found: Found) -> list[CommissioningItem]:
     """Everything that was looked for, parameters first."""
     return [*_crank(found), *_torque(found), *_drive(found)]
 
 
-def changes(found: list[Item]) -> dict[str, Any]:
+def changes(found: list[CommissioningItem]) -> dict[str, Any]:
     """Values of the monitor's parameters among items."""
     return {item.name: item.value for item in found if "." in item.name or item.name == "crank_joint"}
 
 
-def _chosen(found: Found, name: str, **own: Any) -> Item:
+def _chosen(found: Found, name: str, **own: Any) -> CommissioningItem:
     """A choice among candidates, with the best candidate that differs in this choice."""
     rival = found.choice.rivals.get(name)
     if rival:
@@ -197,10 +367,10 @@ def _chosen(found: Found, name: str, **own: Any) -> Item:
             "crank.gear_ratio": float(f"{rival.fit.gear_ratio:.4g}"),
         }
         own |= {"other": values[name], "other_mismatch": rival.fit.mismatch}
-    return Item(name=name, mismatch=found.fit.mismatch, **own)
+    return CommissioningItem(name=name, mismatch=found.fit.mismatch, **own)
 
 
-def _crank(found: Found) -> Iterator[Item]:
+def _crank(found: Found) -> Iterator[CommissioningItem]:
     one, (ratio, is_exact) = found.fit, gear(found)
     joint = found.choice.best.joint
     yield _chosen(found, "crank_joint", value=joint.joint, remark=f"in {joint.topic}")
@@ -212,7 +382,7 @@ def _crank(found: Found) -> Iterator[Item]:
         sigma=one.gear_ratio * one.sigma["ratio"] / abs(one.ratio),
         remark=f"measured {one.gear_ratio:.7g}" if is_exact else "not a ratio of small whole numbers",
     )
-    yield Item(
+    yield CommissioningItem(
         name="crank.offset_rad",
         value=round(offset_rad(found, max(one.offset_rad)), 4),
         unit="rad",
@@ -223,25 +393,25 @@ def _crank(found: Found) -> Iterator[Item]:
     )
 
 
-def _torque(found: Found) -> Iterator[Item]:
+def _torque(found: Found) -> Iterator[CommissioningItem]:
     one, torque = found.fit, found.choice.best.torque
     yield _chosen(found, "drive_torque.source", value=torque.source, remark=torque.label)
     if torque.source == WRENCH:
-        yield Item(name="drive_torque.axis", value=torque.component)
+        yield CommissioningItem(name="drive_torque.axis", value=torque.component)
     if torque.source == INTERFACE:
-        yield Item(name="drive_torque.interface", value=torque.interface)
+        yield CommissioningItem(name="drive_torque.interface", value=torque.interface)
     yield _chosen(found, "drive_torque.sign", value=one.torque_sign)
     scale, turns = _scale(found)
     total = 1.0 / abs(one.gain)
-    yield Item(
+    yield CommissioningItem(
         name="drive_torque.scale",
         value=scale,
         sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), one.error.scale),
         mismatch=one.mismatch,
         remark=f"measured scale times gear ratio: {total:.4g}",
     )
-    yield Item(name="drive_torque.gear_ratio", value=turns)
-    yield Item(
+    yield CommissioningItem(name="drive_torque.gear_ratio", value=turns)
+    yield CommissioningItem(
         name="drive_torque.sampling",
         value=found.sampling or found.base.drive_torque.sampling,
         remark=found.why_sampling if found.sampling else "your value, because it was not determined",
@@ -261,9 +431,9 @@ def _scale(found: Found) -> tuple[float, float]:
     return (1.0 if abs(scale - 1.0) <= _NEAR else float(f"{scale:.4g}")), turns
 
 
-def _drive(found: Found) -> Iterator[Item]:
+def _drive(found: Found) -> Iterator[CommissioningItem]:
     one, timing, declared, is_separated = found.fit, found.timing, found.declared, found.timing.is_separated
-    yield Item(
+    yield CommissioningItem(
         name="lag",
         value=timing.late_s,
         unit="s",
@@ -271,18 +441,20 @@ def _drive(found: Found) -> Iterator[Item]:
         remark="in addition to the sampling" if is_separated else "at one cadence, part of the offset",
     )
     cadence, tolerance = cadence_rpm(one)
-    yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")
-    yield Item(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
+    yield CommissioningItem(name="cadence.commanded_rpm", value=cadence, unit="rpm")
+    yield CommissioningItem(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
     for name, unit, remark, given in (
         ("friction", "N m", "constant part, at the crank", declared.coulomb_nm),
         ("load_friction", "", "part proportional to the torque", declared.load_friction),
     ):
         value, sigma = found.friction(name)
         known = f"; declared: {given:.4g} {unit}".rstrip() if math.isfinite(given) else ""
-        yield Item(name=name.replace("_", " "), value=value, unit=unit, sigma=sigma, remark=remark + known)
+        yield CommissioningItem(
+            name=name.replace("_", " "), value=value, unit=unit, sigma=sigma, remark=remark + known
+        )
     if "bias" in one.linear:
         bias = one.linear["bias"] / one.gain
-        yield Item(name="bias", value=bias, unit="N m", sigma=one.sigma["bias"] / abs(one.gain))
+        yield CommissioningItem(name="bias", value=bias, unit="N m", sigma=one.sigma["bias"] / abs(one.gain))
 
 
 # Sentences on undetermined parameters, on quantities that do not fit, and on further information.

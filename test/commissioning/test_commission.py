@@ -12,7 +12,7 @@ import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
 from leg_wear_monitor.commissioning.commission import commission, propose
-from leg_wear_monitor.commissioning.result import CommissioningResult
+from leg_wear_monitor.commissioning.proposal import CommissioningResult
 from leg_wear_monitor.estimate.joint_motion import Series
 from leg_wear_monitor.estimate.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.position import TURN

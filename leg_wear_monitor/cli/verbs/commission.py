@@ -13,7 +13,7 @@ from leg_wear_monitor.cli import common
 from leg_wear_monitor.errors import ConfigError, printable
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.commissioning.result import CommissioningResult
+    from leg_wear_monitor.commissioning.proposal import CommissioningResult
 
 
 # ``leg-wear-monitor commission``: proposes the parameters of a robot from a recording of its healthy leg.

@@ -101,33 +101,22 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0.0 is not in the range x>0.0"),
         (("A", "0,4", "--sigma", "0.01"), "'0,4' is not a valid float range"),
-        (("A", "0.4", "--sigma", "0,01"), "'--sigma': '0,01' is not a valid float range"),
-        (("a", "0.4", "--sigma", "0.01"), "Expected one of A, B, G, I, J; did you mean A?"),
         (("A", "0.00042", "--sigma", "0.005"), "mm is not between 0.003 mm, 1 % of the new clearance"),
-        (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
         (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
-        (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
         (("A", "10.1", "--sigma", "0.01"), "10.1 mm is not between"),
         (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 0.0001 mm to 0.42 mm"),
         (("A", "0.42", "--sigma", "10"), "the measured clearance; did you mean 0.01 mm?"),
-        (("A", "0.42", "--sigma", "1e-5"), "the measured clearance; did you mean 0.01 mm?"),
-        (("A", "0.42", "--sigma", "50"), "50 mm is not a standard deviation"),
+        (("A", "--withdraw"), "no measurement of joint A can be withdrawn"),
+        (("A", "0.4", "--withdraw"), "cannot be combined with MM, --sigma or --accept"),
+        (("A", "--withdraw", "--accept"), "cannot be combined with MM, --sigma or --accept"),
+        (("A", "0.4"), "MM needs --sigma. Expected JOINT MM --sigma MM, or JOINT --withdraw"),
+        ((), "Missing argument 'JOINT'"),
+        (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(refused, ledger, arguments, fault):
     assert fault in refused("measure", *arguments, "--ledger", str(ledger))
     assert rows(ledger) == []
-
-
-def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act(run, ledger, tmp_path):
-    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
-    arguments = ("--sigma", "0.005", "--ledger", str(ledger), "--config", "mine.yaml")
-    near = run("measure", "A", "0.42", *arguments)
-    assert near.code == 0
-    assert "above 80 % of its limit: the alarm clearance A is raised" in near.out
-    at = run("measure", "B", "0.451", *arguments)
-    assert "contradicts" not in at.out
-    assert (at.code, "at its limit" in at.out) == (1, True)
 
 
 def alarms(path):
@@ -149,7 +138,8 @@ def verdict(path):
     [("0.7", 2, "stop", "CLEARANCE_G"), ("0.5", 1, "watch", "CLEARANCE_NEAR_G")],
 )
 def test_a_measurement_at_the_limit_or_near_it_raises_alarm_and_verdict(run, ledger, mm, level, state, code):
-    run("measure", "G", mm, "--sigma", "0.02", "--ledger", str(ledger))
+    """At the limit, the caller has to act."""
+    assert run("measure", "G", mm, "--sigma", "0.02", "--ledger", str(ledger)).code == (state == "stop")
     value = pytest.approx(1e-3 * float(mm))
     assert alarms(ledger) == ([("G", level, 0, value, "measured")], [("G", level)])
     now = verdict(ledger)
@@ -223,29 +213,6 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     assert again.out.splitlines()[:3] == first.out.splitlines()[:3]
     assert again.out.splitlines()[3].startswith("2 of 2 measured clearances")
     assert run("measure", "A", "--withdraw", *kept).code == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "fault"),
-    [
-        (("A", "--withdraw"), "no measurement of joint A can be withdrawn"),
-        (("A", "0.4", "--withdraw"), "cannot be combined with MM, --sigma or --accept"),
-        (("A", "--withdraw", "--accept"), "cannot be combined with MM, --sigma or --accept"),
-        (("knee", "--withdraw"), "no measurement of joint G can be withdrawn"),
-        (("neck", "--withdraw"), "'neck' is not a clearance joint"),
-        (("A", "0.4"), "MM needs --sigma. Expected JOINT MM --sigma MM, or JOINT --withdraw"),
-        ((), "Missing argument 'JOINT'"),
-        (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
-    ],
-)
-def test_what_cannot_be_withdrawn_is_one_line(refused, ledger, arguments, fault):
-    assert fault in refused("measure", *arguments, "--ledger", str(ledger))
-
-
-def test_a_label_names_a_joint_in_all_that_is_done_with_its_measurements(run, ledger):
-    kept = ("--ledger", str(ledger))
-    run("measure", "knee", "0.37", "--sigma", "0.01", *kept)
-    assert run("measure", "knee", "--withdraw", *kept).out.startswith("G: 0.37 mm")
 
 
 def test_a_ledger_has_to_be_named(refused):

@@ -88,6 +88,13 @@ def test_the_tables_of_a_study_have_the_documented_columns(study: Path) -> None:
     assert list(tables["points"]["clearances"]) == ["A, B", "G", "I, J"]
     assert list(tables["joints"]["joint"]) == ["A", "B", "G", "I", "J"]
     assert (tables["points"]["toe_position_m.mean"] > 0.0).all() and tables["exponents"].empty
+    means = figures(study / "out")  # over runs and cycles
+    for row in tables["points"].to_dict("records"):
+        assert row["rms_torque_nm.mean"] == pytest.approx(means[f"{row['clearances']}: rms_torque_nm"])
+    for row in tables["joints"].to_dict("records"):
+        point = next(each for each in ("A, B", "G", "I, J") if row["joint"] in each)
+        for name in ("mean_force_n", "archard_integral_j_per_cycle"):
+            assert row[f"{name}.mean"] == pytest.approx(means[f"{point}: {name} {row['joint']}"])
     with pytest.raises(lw.ConfigError):
         lw.load_study(study)
 

@@ -1,4 +1,4 @@
-"""Tasks of studies: Lyapunov exponents, sections, responses, tables."""
+"""Tasks of studies: Lyapunov exponents, sections, responses."""
 
 import attrs
 import numpy as np
@@ -7,14 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import TORQUE_ERROR, new_run_statistics, steady_drive
+from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.person import with_ground_reaction
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.studies.study import Point, parse_study
-from leg_wear_monitor.studies.tables import exponent, fraction_of_range, joint_columns, point_columns
+from leg_wear_monitor.studies.study import parse_study
+from leg_wear_monitor.studies.tables import exponent, fraction_of_range
 from leg_wear_monitor.studies.tasks import (
     ERRORS,
     PORTRAIT_SAMPLES,
@@ -29,7 +28,7 @@ from leg_wear_monitor.studies.tasks import (
 )
 from leg_wear_monitor.wear import BUSHING
 
-# The exponent's code gives what is known: maps, a flow, a bouncing ball; calm legs differ from wild ones.
+# The exponent's code gives what is known: maps, a bouncing ball; calm legs differ from wild ones.
 
 
 def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, distance=1.0e-9):
@@ -44,26 +43,6 @@ def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, di
 
 def agrees(estimate, value, within=0.0):
     return abs(estimate.value - value) < 4.0 * estimate.error + within
-
-
-def test_lorenz_s_flow():
-    """0.9056, e.g. Sprott, Chaos and Time-Series Analysis, 2003; Runge and Kutta's fourth order."""
-
-    def field(p):
-        x, y, z = p
-        return np.array([10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z])
-
-    def advance(p, h=0.01):
-        for _ in range(5):
-            a = field(p)
-            b = field(p + 0.5 * h * a)
-            c = field(p + 0.5 * h * b)
-            d = field(p + h * c)
-            p = p + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        return p
-
-    estimate = measured(advance, [[1.0, 1.0, 20.0], [-4.0, 2.0, 25.0], [5.0, 3.0, 30.0]], 1600, 0.05, 200)
-    assert agrees(estimate, 0.9056, 0.01)
 
 
 def test_a_ball_that_bounces_on_a_shaking_table():
@@ -91,17 +70,6 @@ def test_a_linear_map_has_the_logarithm_of_its_larger_factor(rate, distance, sca
 
     logs = stretches(lambda x: factors * x, np.zeros(2), np.ones(2), np.full(2, scale), distance, 60)
     assert logs[40:].mean() == pytest.approx(rate, abs=1.0e-6)
-
-
-def test_a_coordinate_without_a_scale_is_the_first_one_s():
-    seen = []
-
-    def advance(x):
-        seen.append(x.copy())
-        return np.array([2.0 * x[0], x[1] + 1.0])
-
-    stretches(advance, np.array([0.0, 5.0]), np.ones(2), np.array([1.0, 0.0]), 1.0e-6, 3)
-    assert [x[1] for x in seen] == [5.0, 5.0, 6.0, 6.0, 7.0, 7.0]
 
 
 def test_neighbours_that_meet_do_not_end_the_count():
@@ -261,26 +229,6 @@ def test_curves_stay_within_the_largest_errors(response):
     assert torque <= response["error_drive_torque_nm"][0, 0] * (1.0 + 1.0e-3)
 
 
-def test_a_fine_curve_reaches_the_largest_torque():
-    """Looked at every 30 us, the drive torque departs from the ideal leg's as far as the tally says."""
-    (leg,) = observed_legs(ensemble(load_mechanism(), PLACE | {"runs": 1}))
-    turn, drive, statistics = 2**15, steady_drive(0.0, TURN), new_run_statistics(10)
-    leg.stepper = ClearanceStepper(leg.setup, interval_s=1.0 / turn)
-    leg.stepper.init(0.0, TURN)
-    leg.stepper.advance(drive, 0.02, new_run_statistics(10))
-    begin, errors = round(leg.stepper.time * turn), []
-    for i in range(begin, begin + turn // 8):
-        errors.append(abs(leg.observe().drive_torque - leg.stepper.work.now.torque_0[0]))
-        leg.stepper.advance(drive, (i + 1) / turn, statistics)
-    assert statistics.impacts.sum() > 0
-    assert 0.99 < max(errors) / statistics.response[TORQUE_ERROR] < 1.001
-
-
-def test_a_percentile_of_a_force_lies_between_its_mean_and_its_peak(response):
-    p99 = response["p99_force_n"]
-    assert (p99 > response["mean_force_n"]).all() and (p99 <= response["peak_force_n"].max(axis=1)).all()
-
-
 def test_toe_moves_as_its_deviations_say(response):
     """Velocity is the derivative of the displacement, up to what an impact changes between two samples."""
     step = 1.0 / SAMPLES
@@ -353,76 +301,3 @@ def test_friction_and_laws_reach_the_joints():
     assert leg.setup.contacts.friction[0, 0] == 0.0
     assert leg.setup.contacts.hysteresis[0] == 0.0
     assert leg.stepper.state.drive[0] != other.stepper.state.drive[0]
-
-
-# Tables of a study: a row a point, a row a joint, each statistic with its mean and its deviation.
-
-
-OF_MOTION = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
-
-OF_CONTACT = (
-    "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle", "impact_speed_mps",
-)  # fmt: skip
-
-
-def made_response(factor, clearance_joints):
-    """Arrays of two runs, three cycles and the joints A, G and J."""
-    k = len(clearance_joints)
-    runs = factor * np.array([1.0, 3.0])
-    of_joints = np.broadcast_to(runs[:, None], (2, k))
-    arrays = {f"error_{name}": np.broadcast_to(runs[:, None], (2, 3)) for name in OF_MOTION}
-    arrays |= {name: np.broadcast_to(runs[:, None], (2, 3)) for name in ("mean_force_n", "rms_force_n")}
-    arrays |= dict.fromkeys(OF_CONTACT, of_joints)
-    return arrays | {
-        "ideal_drive_torque_nm": np.zeros(4),
-        "p99_force_n": np.array([[1.0, 5.0, 9.0], [1.0, 7.0, 9.0]]),
-        "peak_force_n": np.broadcast_to(np.array([10.0, 20.0, 30.0]), (2, 3, 3)),
-        "impacts": np.full((2, 3, k), 4.0),
-        "rms_torque_nm": runs,
-        "wear_depth_m_per_cycle": np.broadcast_to(runs[:, None, None, None] * [[[[1e-12]]]], (2, k, 2, 8)),
-        "joints": np.array(["A", "G", "J"]),
-        "clearance_joints": np.array(clearance_joints),
-    }
-
-
-def point(label, clearance_joints, clearance_m):
-    settings = {"clearances": clearance_joints, "clearance_m": clearance_m, "speed_rpm": 60.0}
-    return Point(label=label, task="response", settings=settings)
-
-
-@pytest.fixture
-def found():
-    return [
-        (point("small", ["G", "J"], 1e-4), made_response(1.0, ["G", "J"])),
-        (point("large", ["G"], 2e-4), made_response(2.0, ["G"])),
-    ]
-
-
-def test_a_row_a_point(found):
-    columns = point_columns(found)
-    assert {len(column) for column in columns.values()} == {2}
-    assert columns["point"] == ["small", "large"]
-    assert columns["clearances"] == ["G, J", "G"]
-    assert columns["clearance_m"] == [1e-4, 2e-4]
-    assert columns["drive_torque_nm.mean"] == [2.0, 4.0]
-    assert columns["rms_torque_nm.deviation"] == [1.0, 2.0]
-
-
-def test_a_toe_that_is_not_there_has_no_errors(found):
-    assert point_columns(found)["toe_position_m.mean"] == [None, None]
-
-
-def test_a_row_a_point_and_clearance_joint(found):
-    columns = joint_columns(found)
-    assert {len(column) for column in columns.values()} == {3}
-    assert list(zip(columns["point"], columns["joint"], strict=True)) == [
-        ("small", "G"), ("small", "J"), ("large", "G"),
-    ]  # fmt: skip
-    assert columns["p99_force_n.mean"] == [6.0, 9.0, 6.0]
-    assert columns["peak_force_n.mean"] == [20.0, 30.0, 20.0]
-    assert columns["wear_depth_m_per_cycle.mean"] == pytest.approx([2e-12, 2e-12, 4e-12])
-
-
-def test_without_a_result_the_columns_are_the_same(found):
-    for table in (point_columns, joint_columns):
-        assert {name: [] for name in table(found)} == table([])

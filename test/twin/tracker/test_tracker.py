@@ -112,15 +112,6 @@ def test_a_topic_that_comes_later_is_waited_for(gait, late_s):
     assert_all_but_the_first_are_used(delayed, tracker, whole, late_s)
 
 
-def test_topics_that_come_in_bursts_are_sorted(gait):
-    """A tenth of a second of the one, then of the other: as a busy node serves them."""
-    samples = with_torque(gait(3.0))
-    crank, torque = samples[samples["kind"] != TORQUE], samples[samples["kind"] == TORQUE]
-    bursts = [part for pair in zip(np.split(crank, 30), np.split(torque, 30), strict=True) for part in pair]
-    tracker = CrankTracker(TrackerSettings())
-    assert_all_but_the_first_are_used(track(bursts, tracker), tracker, track([samples]), 0.1)
-
-
 @settings(max_examples=10)
 @given(
     seed=st.integers(0, 100),

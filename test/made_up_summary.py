@@ -6,12 +6,11 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
-from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.reports import ClearanceObservation, Lost
 from leg_wear_monitor.recordings.findings import Finding, Severity
 from leg_wear_monitor.recordings.result import (
     EncoderEvidence,

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from enum import Enum
 
 import attrs
 
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.alarms import NO_FAULT, Alarm
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast, LegForecast
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.situation import joint_status
@@ -17,6 +17,51 @@ from leg_wear_monitor.twin.statistics import SampleStatistics
 
 SampleReports = SampleStatistics
 """The leg at each processed sample; NaN while it is not tracked."""
+
+
+_SURE_SIGMAS = 4.0  # of a significant departure by encoders
+_LEAST_M = 5.0e-5  # smallest departure that is reported
+
+
+class ClearanceObservation(Enum):
+    """Observability of a clearance; the value is human-readable."""
+
+    WAITING = "not enough gait cycles with encoders yet"
+    COMMISSIONING = "the encoders are being commissioned"
+    NOT_OBSERVABLE = "not observable with these encoders"
+    SEEN = "seen by encoders"
+
+
+@attrs.frozen(kw_only=True)
+class ClearanceEstimate:
+    """A clearance estimated from encoders.
+
+    Attributes
+    ----------
+    observation : ClearanceObservation
+    clearance_m, sigma_m : float
+        Clearance and its standard deviation; NaN unless it is estimated.
+    departure_m : float
+        Estimated minus modelled clearance; NaN unless it is estimated.
+    believed : bool
+        True if the forecast uses it: not if the model gives it a tail probability below 0.135 %.
+    """
+
+    observation: ClearanceObservation
+    clearance_m: float = math.nan
+    sigma_m: float = math.nan
+    departure_m: float = math.nan
+    believed: bool = False
+
+    @property
+    def is_other(self) -> bool:
+        """True if the clearance differs significantly from the modelled clearance."""
+        return abs(self.departure_m) >= max(_LEAST_M, _SURE_SIGMAS * self.sigma_m)
+
+    @property
+    def surely_m(self) -> float:
+        """Size of a significant departure; 0 if there is none, NaN if it is not estimated."""
+        return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
 
 
 @attrs.frozen(kw_only=True)

@@ -12,7 +12,6 @@ from leg_wear_monitor.mechanism.materials import bushing_of
 from leg_wear_monitor.mechanism.person import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
-from leg_wear_monitor.monitor.angle_regression import ClearanceEstimate
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
@@ -20,7 +19,7 @@ from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, ModelError, growth_rate, model_error
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.monitor.reports import ClearanceEstimate, CycleReport, JointReport
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference import LegParameters

@@ -10,11 +10,10 @@ from leg_wear_monitor.configuration.strict import structure_of_version
 from leg_wear_monitor.files import data_frame, finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
-from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
-from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.reports import ClearanceObservation, Lost
 from leg_wear_monitor.recordings.findings import Finding
 from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState, Level
 
@@ -82,7 +81,7 @@ def _perhaps() -> Any:
 
 @attrs.frozen(kw_only=True)
 class EncoderEvidence:
-    """Evidence of further encoders about a clearance; see `monitor.encoders.ClearanceEstimate`.
+    """Evidence of further encoders about a clearance; see `monitor.reports.ClearanceEstimate`.
 
     Attributes
     ----------

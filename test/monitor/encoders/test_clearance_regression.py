@@ -10,13 +10,15 @@ from leg_wear_monitor.dynamics.run import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.angle_regression import (
-    ClearanceObservation,
+from leg_wear_monitor.monitor.config.inputs import Encoders
+from leg_wear_monitor.monitor.encoders import (
     ClearanceRegression,
     clearance_estimates,
+    commissioned,
+    errors_of,
+    prior_with,
 )
-from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders import commissioned, errors_of, prior_with
+from leg_wear_monitor.monitor.reports import ClearanceObservation
 from leg_wear_monitor.twin.reference import HARMONICS, CrankProfile, even_angles, worn_to
 from leg_wear_monitor.twin.references import (
     PHASES,

@@ -11,11 +11,11 @@ from reported import status_of
 
 from leg_wear_monitor import ConfigError, WearMonitor
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.angle_regression import ClearanceObservation
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.encoders import errors_of
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.monitor.ledger.file import read as read_records
+from leg_wear_monitor.monitor.reports import ClearanceObservation
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.references import PHASES, AngleReferenceRun, angle_model
 from leg_wear_monitor.twin.sample import EMPTY

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import leg_wear_monitor as lw
 
 BAG = lw.share_directory() / "bags" / "healthy.mcap"
-CRANK, TORQUE, TURN = 0, 1, 2.0 * np.pi
+CRANK, TORQUE, LOAD, TURN = 0, 1, 2, 2.0 * np.pi
 
 
 @attrs.frozen(eq=False)
@@ -354,23 +354,54 @@ SIGNALS = {
     "infinite": lambda angle: np.where(np.sin(angle) > 0.5, np.inf, angle),
     "missing": lambda angle: np.where(np.sin(angle) > 0.0, np.nan, angle),
     "repeated": lambda angle: np.repeat(angle[::8], 8)[: len(angle)],
+    "noise": lambda angle: np.random.default_rng(1).standard_normal(len(angle)),
     "sound": lambda angle: 9.0 * np.sin(angle),
     "angle": lambda angle: angle,
 }
 
 
+signals = st.sampled_from(sorted(SIGNALS))
+
+
 @settings(max_examples=12, deadline=None)
 @given(
-    angles=st.lists(st.sampled_from(sorted(SIGNALS)), min_size=1, max_size=3),
-    torque=st.sampled_from(sorted(SIGNALS)),
+    angles=st.lists(signals, min_size=1, max_size=3), torque=signals, load=signals, is_watched=st.booleans()
 )
-def test_nothing_that_arrives_ends_the_monitor(leg: lw.Mechanism, angles: list[str], torque: str) -> None:
-    monitor, n = lw.WearMonitor(leg), np.arange(400)
-    for number, name in enumerate(angles):
-        stamp_ns = 10**18 + number * 2 * 10**9 + n * 5_000_000
-        angle = TURN * n / 200.0
+def test_nothing_that_arrives_ends_the_monitor(
+    leg: lw.Mechanism, parameters, angles: list[str], torque: str, load: str, is_watched: bool
+) -> None:
+    """Nor its search for the crank's zero, its encoders and its foot load, after a crank that is sound."""
+    watched = {
+        "crank__zero": "at_start",
+        "encoders__names": ["hip", "knee"],
+        "encoders__joints": ["B", "G"],
+        "foot_load__source": "wrench",
+        "load__model": "measured",
+        "diagnosis__enabled": False,
+    }
+    config = lw.load_config(parameters(**watched)) if is_watched else lw.MonitorConfig()
+    monitor, angle = lw.WearMonitor(leg, config), TURN * np.arange(600) / 100.0
+    for number, name in enumerate(["angle", *angles] if is_watched else angles):
+        stamp_ns = 10**18 + 10_000_000 * (number * len(angle) + np.arange(len(angle)))
         crank = lw.gait_samples(stamp_ns, crank_angle_rad=SIGNALS[name](angle))
+        crank["encoder_rad"][:, 0], crank["encoder_rad"][:, 1] = SIGNALS[name](angle), angle
         drive = lw.gait_samples(stamp_ns + 1000, TORQUE, torque_nm=SIGNALS[torque](angle))
-        monitor.update(np.stack([crank, drive], axis=1).ravel())
+        foot = lw.gait_samples(stamp_ns + 2000, LOAD)
+        foot["foot_force_n"][:] = SIGNALS[load](angle)[:, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            monitor.update(np.stack([crank, drive, foot], axis=1).ravel())
     assert monitor.state.verdict.joints == ()
     assert np.isfinite(monitor.clearances_m).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(angle=signals, torque=signals)
+def test_commission_proposes_or_says_why_not(angle: str, torque: str) -> None:
+    turned = TURN * np.arange(1200) / 100.0
+    columns = {"crank_angle": SIGNALS[angle](turned), "drive_torque": SIGNALS[torque](turned)}
+    try:
+        result = lw.commission({"time": 1.0e9 + 0.01 * np.arange(1200), **columns})
+    except lw.LegWearError as error:
+        assert str(error)
+        return
+    assert result.not_told if result.config is None else np.isfinite(result.config.crank.offset_rad)

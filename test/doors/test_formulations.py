@@ -1,5 +1,7 @@
 """Full coordinates and clearance coordinates, which share no equations of motion, give the same leg."""
 
+import attrs
+import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
@@ -24,10 +26,11 @@ def test_mean_forces_and_wear_agree_within_their_scatter(both) -> None:
     assert clearance.drive_torque_nm.rms == pytest.approx(full.drive_torque_nm.rms, rel=0.05)
 
 
-def test_from_one_start_both_come_to_the_same_first_impacts(leg) -> None:
+@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg"])
+def test_from_one_start_both_come_to_the_same_first_impacts(name: str) -> None:
     """Later ones differ, because the motion is chaotic."""
     full, clearance = (
-        lw.simulate(leg, model=model, cycles=0.05, skip_cycles=0).impacts for model in ("full", "clearance")
+        lw.simulate(name, model=model, cycles=0.05, skip_cycles=0).impacts for model in ("full", "clearance")
     )
     for joint in "ABG":
         of_full, other = full[joint][0], clearance[joint][0]
@@ -42,3 +45,42 @@ def test_a_narrow_clearance_carries_the_forces_of_the_ideal_leg(leg) -> None:
     for joint in "ABGIJ":
         force_n = ideal.joints[joint].mean_force_n
         assert narrow.joints[joint].mean_force_n == pytest.approx(force_n, rel=0.05)
+
+
+def mirrored(leg: lw.Mechanism) -> lw.Mechanism:
+    """The mechanism seen in a mirror: x -> -x, its bodies too, and its crank turns the other way."""
+
+    def points(named: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        return {name: (-x, y) for name, (x, y) in named.items()}
+
+    bodies = {
+        name: attrs.evolve(body, com=(-body.com[0], body.com[1]), points=points(body.points))
+        for name, body in leg.bodies.items()
+    }
+    poses = {name: (-x, y, -angle) for name, (x, y, angle) in leg.assembly.poses.items()}
+    return attrs.evolve(
+        leg,
+        ground=attrs.evolve(leg.ground, points=points(leg.ground.points)),
+        bodies=bodies,
+        drive=attrs.evolve(leg.drive, speed=-leg.drive.speed),
+        assembly=attrs.evolve(leg.assembly, crank_angle=-leg.assembly.crank_angle, poses=poses),
+    )
+
+
+@pytest.mark.parametrize(("model", "cycles"), [("full", 0.3), ("clearance", 0.09)])
+def test_a_mirrored_leg_moves_and_wears_mirrored(leg, model: str, cycles: float) -> None:
+    """Through its impacts, until rounding shows: no sign is lost anywhere, so even chaos is the same."""
+    own, other = (
+        lw.simulate(one, model=model, clearances=("A", "B"), cycles=cycles, skip_cycles=0, wear=True)
+        for one in (leg, mirrored(leg))
+    )
+    for joint in "AB":
+        assert other.joints[joint].mean_force_n == pytest.approx(own.joints[joint].mean_force_n, rel=1.0e-5)
+        assert len(own.impacts[joint]) >= 5
+        for one, seen in zip(own.impacts[joint], other.impacts[joint], strict=True):
+            assert (seen.begin_s, seen.peak_n) == pytest.approx((one.begin_s, one.peak_n), rel=1.0e-3)
+    # an angle turns into pi less it: sector i into N / 2 - 1 - i
+    depth = own.surfaces.depth
+    count = depth.shape[2]
+    found = other.surfaces.depth[:, :, (count // 2 - 1 - np.arange(count)) % count]
+    np.testing.assert_allclose(found, depth, atol=1.0e-3 * depth.max())

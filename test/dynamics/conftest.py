@@ -34,35 +34,6 @@ class Cycles:
     energy: list[EnergyBalance]
 
 
-def _mirrored(mechanism: Mechanism) -> Mechanism:
-    def points(named):
-        return {name: (-x, y) for name, (x, y) in named.items()}
-
-    start = mechanism.assembly
-    bodies = {
-        name: attrs.evolve(body, com=(-body.com[0], body.com[1]), points=points(body.points))
-        for name, body in mechanism.bodies.items()
-    }
-    return attrs.evolve(
-        mechanism,
-        gravity=(-mechanism.gravity[0], mechanism.gravity[1]),
-        ground=attrs.evolve(mechanism.ground, points=points(mechanism.ground.points)),
-        bodies=bodies,
-        drive=attrs.evolve(mechanism.drive, speed=-mechanism.drive.speed),
-        assembly=attrs.evolve(
-            start,
-            crank_angle=-start.crank_angle,
-            poses={name: (-x, y, -angle) for name, (x, y, angle) in start.poses.items()},
-        ),
-    )
-
-
-@pytest.fixture(scope="session")
-def mirrored() -> Callable[[Mechanism], Mechanism]:
-    """Makes the mechanism seen in a mirror: x -> -x, its bodies too, and its crank turns the other way."""
-    return _mirrored
-
-
 @pytest.fixture(scope="session")
 def leg_cycles(leg: Mechanism) -> Callable[..., Cycles]:
     """Cycles of the leg with the clearance joints named in a string, the first second dropped."""

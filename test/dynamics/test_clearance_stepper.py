@@ -9,19 +9,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor import Mechanism, load_mechanism
+from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.clearance.model import DAMPING, PARTS, coupling_of
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,
-    BEGIN,
     DONE,
     FORCE,
     INVALID_DRIVE,
-    PEAK,
-    SPEED,
     TORQUE,
     RunStatistics,
     new_run_statistics,
@@ -31,7 +28,7 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.statistics import energy_balance
 from leg_wear_monitor.mechanism.position import TURN, ideal_motion
 from leg_wear_monitor.mechanism.spec import Track, TrackDrive
-from leg_wear_monitor.wear import SECTORS, Surfaces, worn_volume
+from leg_wear_monitor.wear import Surfaces, worn_volume
 
 # The clearance stepper as a twin drives it: any motion of the crank, in any pieces, from any snapshot.
 
@@ -246,24 +243,6 @@ def test_at_rest_the_contacts_carry_the_weight(leg, tables):
     np.testing.assert_allclose(statistics.integral[:, FORCE] / statistics.time[0], wanted, rtol=0.01)
 
 
-def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg, mirrored):
-    """With the crank turning backwards; until rounding, multiplied by impacts, shows."""
-    steppers = []
-    for mechanism, speed in ((worn_leg, TURN), (mirrored(worn_leg), -TURN)):
-        stepper = ClearanceStepper(prepare(mechanism, clearances=("A", "B"), wear=True))
-        drive(stepper, [Piece(steady_drive(0.0, speed), 0.09)], new_run_statistics(10))
-        steppers.append(stepper)
-    seen, other = steppers
-    assert np.abs(seen.state.e).max() > 2.9e-4
-    flip = np.tile([-1.0, 1.0], 2)
-    np.testing.assert_allclose(other.state.e, flip * seen.state.e, atol=1.0e-9)
-    np.testing.assert_allclose(other.state.v, flip * seen.state.v, atol=1.0e-5)
-    # an angle turns into pi less it: sector i into N / 2 - 1 - i
-    sector = (SECTORS // 2 - 1 - np.arange(SECTORS)) % SECTORS
-    depth = seen.state.depth
-    np.testing.assert_allclose(other.state.depth[:, :, sector], depth, atol=1.0e-3 * depth.max())
-
-
 @settings(max_examples=10)
 @given(t=st.floats(0.01, 1.0))
 def test_no_wear_is_lost(new_stepper, t):
@@ -274,22 +253,6 @@ def test_no_wear_is_lost(new_stepper, t):
     volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
     wanted = contacts.wear_coefficient * statistics.integral[contacts.joint, ARCHARD][:, None]
     np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
-
-
-@pytest.mark.chaotic
-@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg"])
-def test_it_is_the_full_motion_until_impacts_decorrelate(name):
-    """Every joint's first impact: when, how fast, how hard; the models differ by e / L from the start on."""
-    mechanism = load_mechanism(name)
-    setup, statistics_of_all = prepare(mechanism), [new_run_statistics(10), new_run_statistics(10)]
-    stepper = ClearanceStepper(prepare(mechanism), interval_s=1.0e-4)
-    drive(stepper, [Piece(steady_drive(0.0, setup.speed), 0.025)], statistics_of_all[0])
-    FullRun(setup).advance(0.025, statistics_of_all[1])
-    first, wanted = (statistics.impact[setup.contacts.joint, 0] for statistics in statistics_of_all)
-    assert all((statistics.impacts[setup.contacts.joint] > 0).all() for statistics in statistics_of_all)
-    np.testing.assert_allclose(first[:, BEGIN], wanted[:, BEGIN], atol=2.0e-5)
-    np.testing.assert_allclose(first[:, SPEED], wanted[:, SPEED], rtol=0.01)
-    np.testing.assert_allclose(first[:, PEAK], wanted[:, PEAK], rtol=0.02)
 
 
 # A crank behind a coupling: energy, the rigid limit, full coordinates.

@@ -293,16 +293,6 @@ def test_without_an_index_of_time_the_order_is_the_same(path, few, expected, rea
     assert samples.tobytes() == expected(few).tobytes()
 
 
-def test_a_complaint_that_is_no_text_is_one(path, read):
-    """SQLite repeats what it cannot understand, byte by byte."""
-    content = path.read_bytes()
-    assert b"CREATE TABLE messages(" in content
-    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CR\x89ATE TABLE messages("))
-    with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: ") as caught:
-        read(path)
-    assert str(caught.value).isprintable()
-
-
 # What a recording claims does not decide how much memory it gets; what it is not given is reported.
 
 

@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -22,7 +21,6 @@ from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.message_checks import wanted_interfaces
-from leg_wear_monitor.recordings.streams import types
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.state import State
 
@@ -191,17 +189,6 @@ def test_without_control_msgs_a_line_names_the_parameter_and_the_package(
     )
     with pytest.raises(ConfigError, match=f"^{re.escape(line)}$"):
         stage.monitor(drive_torque__source="interface")
-
-
-def test_the_stand_ins_interfaces_are_read_by_the_library(stand_ins: Any) -> None:
-    states = stand_ins.Hardware().read(0.5)
-    message: Any = types().deserialize_cdr(
-        encode.dynamic_joint_states([7], states)[0].tobytes(), encode.DYNAMIC_JOINT_STATE
-    )
-    assert message.joint_names == list(stand_ins.INTERFACES)
-    for joint, of in zip(message.joint_names, message.interface_values, strict=True):
-        assert of.interface_names == list(stand_ins.INTERFACES[joint])
-        assert np.isfinite(of.values).all()
 
 
 def test_a_node_needs_no_library_that_no_ros_package_has() -> None:

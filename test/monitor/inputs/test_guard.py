@@ -1,6 +1,5 @@
 """Signals that no leg sends: named, and never counted as wear."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""The evidence of gait cycles: tests for a change, its explanations, and the clearances."""
+"""The evidence of gait cycles: their signatures, tests for a change, its explanations, and the clearances."""
 
 import math
 from collections.abc import Sequence
@@ -22,11 +22,103 @@ from leg_wear_monitor.estimate.clearance_fit import (
 )
 from leg_wear_monitor.estimate.drive import DIRECT
 from leg_wear_monitor.estimate.explanations import Explanation, change_of, with_doubt
-from leg_wear_monitor.estimate.signature import with_noise_of
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.estimate.signature import TorqueSensor, averaged, signatures, with_noise_of
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.references import LegModels
-from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import (
+    FIRST_CYCLES,
+    UNUSABLE_CYCLES,
+    UNUSED_CYCLES,
+    NotUsed,
+    SignedCycle,
+    TorqueState,
+    mean_of,
+)
+from leg_wear_monitor.twin.reference import cycle_profile
+from leg_wear_monitor.twin.sample import INSTANT, within
+
+_LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
+_LEAST_CRANK_SAMPLES = 40  # least number of samples in a gait cycle for its profile
+
+# largest jitter as a fraction of the sensor's period; beyond it, steps between samples do not show the
+# roughness
+_JITTER = 0.15
+
+# A period near a rounding boundary may round either way between runs, so both are tried.
+_ROUNDED = (1.0, 0.995, 1.005)
+
+
+def _jitter(between_ns: Ints, period_ns: float) -> float:
+    """Median departure of times between samples (n,) from a period, as a fraction of it."""
+    return float(np.median(np.abs(between_ns - period_ns))) / period_ns
+
+
+def find_sensor(
+    state: TorqueState, begin_ns: int, end_ns: int, config: MonitorConfig, size_nm: float
+) -> None:
+    """Find the sensor's period in the first gait cycle with torques, and again where its rate has changed.
+
+    A short disturbance does not discard the knowledge of the leg, or a change that was found.
+    """
+    own = state.sensor
+    is_known = state.reference is not None or len(state.waiting) >= FIRST_CYCLES
+    last = (NotUsed.JITTER,) * (UNUSED_CYCLES if is_known else UNUSABLE_CYCLES)
+    if own is not None and (state.changes or state.unused[-len(last) :] != last):
+        return
+    between_ns = np.diff(within(state.samples.torque, begin_ns, end_ns)["stamp_ns"])
+    period_ns = float(np.median(between_ns)) if len(between_ns) > 1 else math.nan
+    if math.isnan(period_ns) or (own is not None and _jitter(between_ns, period_ns) > _JITTER):
+        return
+    near = [float(f"{part * (1.0e-9 * period_ns):.2g}") for part in _ROUNDED]
+    known = {one.period_s for one in state.baselines}
+    period_s = next((one for one in near if one in known), near[0])
+    # cycles at the commanded cadence only, because a reference is for one cadence
+    cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
+    if own is None or own.period_s != period_s:
+        is_instant = config.drive_torque.sampling == INSTANT
+        state.measure_with(TorqueSensor(period_s, cycle_s, size_nm, is_instant))
+
+
+def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
+    """A gait cycle between two passages of the crank's zero, or why it has no signature.
+
+    Samples at a higher rate than signatures need are averaged.
+    """
+    sensor = state.sensor
+    if sensor is None or not sensor.phases:
+        return NotUsed.GAP
+    cranks = within(state.samples.crank, begin_ns, end_ns)
+    torques = within(state.samples.torque, begin_ns, end_ns)
+    crank_ns, torque_ns, torque = cranks["stamp_ns"], torques["stamp_ns"], torques["torque_nm"]
+    if len(crank_ns) < _LEAST_CRANK_SAMPLES or len(torque_ns) < 2 * sensor.together:
+        return NotUsed.GAP
+    if _jitter(np.diff(torque_ns), 1.0e9 * sensor.period_s) > _JITTER:
+        return NotUsed.JITTER
+    turned: Floats = np.asarray(np.unwrap(cranks["crank_angle_rad"], period=TURN), dtype=np.float64)
+    since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
+    profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
+    gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
+    # the ends are passages of zero, which torques may be nearer to than the first and the last crank angle
+    ends = TURN * np.round(turned[[0, -1]] / TURN)
+    place = np.concatenate([[begin_ns], crank_ns, [end_ns]])
+    angle = np.interp(torque_ns, place, np.concatenate([ends[:1], turned, ends[1:]]))
+    if sensor.together > 1:
+        angle = angle[sensor.together - 1 :: sensor.together]
+        torque = averaged(torque, sensor.together)
+        gap = averaged(gap.astype(float), sensor.together) > 0.0
+        angle = angle[: len(torque)]
+    step = np.diff(torque, prepend=np.nan)
+    step[gap] = np.nan  # the sample before was lost
+    signature = signatures(np.zeros(len(angle), np.int64), angle, torque, step, sensor)[0]
+    if not np.isfinite(signature).all():
+        return NotUsed.GAP
+    return SignedCycle(begin_ns, end_ns, signature, profile, mean_of(torques["temperature_c"]))
+
+
+# Tests for a change, its explanations, and the clearances.
+
 
 SETTLING_CYCLES = 10  # since a change, before the modelled clearances are corrected by it
 

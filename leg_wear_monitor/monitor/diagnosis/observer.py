@@ -22,8 +22,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.person import upwards
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
-from leg_wear_monitor.monitor.diagnosis.evidence import Evidence, correction_of
-from leg_wear_monitor.monitor.diagnosis.gait_cycles import find_sensor, signed_cycle
+from leg_wear_monitor.monitor.diagnosis.evidence import Evidence, correction_of, find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step, other_sensor
 from leg_wear_monitor.monitor.diagnosis.references import (
     COMMISSIONING_CYCLES,

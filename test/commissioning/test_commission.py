@@ -32,24 +32,6 @@ PHASE_RAD = 0.03
 SIGMA = 0.04  # fraction of the scale: joints with clearance leave a tenth of the torque unexplained
 
 
-def random_robot(seed: int) -> Robot:
-    rng = np.random.default_rng(seed)
-    gear = float(rng.choice([1.0, 1.0, 0.5, 6.25, 9.0, 27.5, 50.0, 100.0]))
-    return Robot(
-        sign=int(rng.choice([1, -1])),
-        gear_ratio=gear,
-        offset_rad=float(rng.uniform(-3.0, 3.0)),
-        source=str(rng.choice([WRENCH, EFFORT, FLOAT64])),
-        axis=str(rng.choice(list("xyz"))),
-        torque_sign=int(rng.choice([1, -1])),
-        scale=float(rng.choice([1.0, 0.8, 4.448, 1.0e-3])),
-        angle_noise_rad=float(rng.choice([1.0e-4, 1.0e-3, 3.0e-3])),
-        torque_noise_nm=float(rng.choice([0.05, 0.3, 1.0])),
-        is_wrapped=gear == 1.0 and bool(rng.integers(2)),
-        seed=seed,
-    )
-
-
 def angle_between(a: float, b: float) -> float:
     return abs((a - b + math.pi) % TURN - math.pi)
 
@@ -74,25 +56,27 @@ def check(robot: Robot, result: CommissioningResult, seconds: float) -> None:
     assert angle_between(crank.offset_rad, robot.offset_rad) < PHASE_RAD
 
 
-def test_the_current_of_ros2_control_is_found_as_the_torque(
-    walked: Walk, record: Record, tmp_path: Path
-) -> None:
-    """Another joint's current, a temperature and a wrench of noise are beside it."""
-    robot = Robot(sign=-1, gear_ratio=9.0, source=INTERFACE, torque_sign=-1, scale=4.448, offset_rad=1.0)
-    result = commission(record(tmp_path / "robot.mcap", robot, walked))
-    check(robot, result, 10.0)
-    assert result.config is not None
-    assert result.config.drive_torque.interface == "motor_current"
+ROBOTS = {
+    # another joint's current, a temperature and a wrench of noise are beside it
+    "current": Robot(
+        sign=-1, gear_ratio=9.0, source=INTERFACE, torque_sign=-1, scale=4.448, offset_rad=1.0, seed=0
+    ),
+    "effort": Robot(gear_ratio=0.5, source=EFFORT, torque_noise_nm=1.0, scale=0.8, offset_rad=-2.0, seed=1),
+    "number": Robot(
+        sign=-1, gear_ratio=27.5, source=FLOAT64, torque_sign=-1, scale=1.0e-3, angle_noise_rad=3.0e-3, seed=2
+    ),
+    "wrench": Robot(axis="x", is_wrapped=True, torque_noise_nm=0.3, offset_rad=2.8, seed=3),
+}
 
 
-@pytest.mark.slow  # the test before holds it for one robot
-@pytest.mark.parametrize("seed", range(10))
-def test_ten_robots(seed: int, walked: Walk, record: Record, tmp_path: Path) -> None:
-    robot = random_robot(seed)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_parameters_of_a_robot_come_back(name: str, walked: Walk, record: Record, tmp_path: Path) -> None:
+    robot = ROBOTS[name]
     result = commission(record(tmp_path / "robot.mcap", robot, walked))
-    assert not result.faults
+    assert not result.faults and not result.findings
     check(robot, result, walked.time_s[-1])
-    assert not result.findings
+    assert result.config is not None
+    assert (result.config.drive_torque.interface == "motor_current") == (name == "current")
 
 
 def signals_of(robot: Robot, walk: Walk) -> Signals:
@@ -144,7 +128,7 @@ def test_another_unit_of_the_torque_changes_the_scale_alone(walked: Walk, propos
     assert scales[0] == pytest.approx(1000.0 * float(scales[1]), rel=1.0e-3)
 
 
-@pytest.mark.parametrize("lag_s", [0.0, 0.0025])
+@pytest.mark.parametrize("lag_s", [0.0, 0.0025, 0.025])
 def test_two_cadences_tell_a_lag_from_an_offset(
     lag_s: float, ideal_walk: MakeWalk, proposed: Propose
 ) -> None:
@@ -156,13 +140,7 @@ def test_two_cadences_tell_a_lag_from_an_offset(
     assert result.item("lag").value == pytest.approx(lag_s - 0.0025, abs=2.0e-4)
     (sampling,) = result.not_told  # ideal joints have no impacts
     assert sampling.startswith("drive_torque.sampling: ") and "no impact is above" in sampling
-    assert not result.findings
-
-
-def test_a_late_torque_is_reported(ideal_walk: MakeWalk, proposed: Propose) -> None:
-    result = proposed(signals_of(Robot(lag_s=0.025, torque_noise_nm=0.01), ideal_walk(40.0, 120.0)))
-    assert result.item("lag").value == pytest.approx(0.0225, abs=3.0e-4)  # beside half a sampling interval
-    assert any("late by" in text for text in result.findings)
+    assert ["late by" in text for text in result.findings] == [True] * (lag_s > 0.01)
 
 
 def test_one_cadence_is_not_enough_to_tell_the_sampling(ideal_walk: MakeWalk, proposed: Propose) -> None:

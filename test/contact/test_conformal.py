@@ -14,9 +14,7 @@ from scipy.integrate import quad
 import leg_wear_monitor as lw
 from leg_wear_monitor.contact.geometry import (
     NARROW_RAD,
-    WIDEST_RAD,
     conformity_doubts,
-    contact_doubt,
     contact_modulus,
     half_angle_of,
     half_angle_under_load,
@@ -218,16 +216,6 @@ def test_the_arc_widens_with_force_and_softness_and_as_the_clearance_falls():
     assert half_angle_of(tight, 500.0) > half_angle_of(STEEL, 500.0)
     bushing = soft(3e-4).clearances["A"]
     assert half_angle_of(bushing, 500.0) > 5.0 * half_angle_of(STEEL, 500.0)
-
-
-def test_what_is_said_of_a_wide_arc_has_its_numbers_and_the_law_that_holds():
-    text = contact_doubt(math.radians(41.0), 800.0, 0.01, is_winkler=False) or ""
-    assert text.startswith("contact half angle 41 deg at 800 N (13.1 mm wide in a radius of 10 mm). ")
-    assert "up to about 30 deg; normal_law winkler is for a conformal one" in text
-    assert contact_doubt(NARROW_RAD, 800.0, 0.01, is_winkler=False) is None
-    assert contact_doubt(math.radians(41.0), 800.0, 0.01, is_winkler=True) is None
-    wide = contact_doubt(WIDEST_RAD + 0.01, 800.0, 0.01, is_winkler=True) or ""
-    assert wide.endswith("normal_law winkler is valid up to 60 deg")
 
 
 def test_shipped_mechanisms_have_narrow_contacts():

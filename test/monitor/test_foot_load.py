@@ -169,23 +169,6 @@ def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end
     assert monitor.lost.unmonitored_s < 1.0
 
 
-@pytest.mark.parametrize(
-    "model, is_sent, words",
-    [
-        ("measured", lambda t: t < 7.0, "the model uses the mean load of earlier gait cycles"),
-        ("measured", lambda t: t < 0.0, "the model uses no load"),
-        ("measured", lambda t: abs(t % 1.0 - 0.4) < 0.3, "the mean load of the last gait cycles"),
-        ("none", lambda t: t < 7.0, "the model uses the load estimated from the drive torque"),
-    ],
-)
-def test_words_on_missing_samples_say_what_acts(walk, model, is_sent, words):
-    t = 1.0e-9 * (walk["stamp_ns"] - START)
-    monitor = monitored(walk[(walk["kind"] != LOAD) | is_sent(t)], model)
-    found = {finding.fault_code: finding for finding in monitor.verdict.findings}
-    assert words in found["FOOT_LOAD_MISSING"].why
-    assert words in status_of(monitor, "foot_load").message
-
-
 def test_noise_without_a_load_does_not_wear_and_is_reported(walk):
     """The knee bears 73 N in the air; under this noise alone it was pressed as by a load."""
     monitor = new_monitor()

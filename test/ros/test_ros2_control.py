@@ -13,7 +13,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
@@ -130,22 +129,6 @@ def test_an_opened_knee_is_shown_by_the_current_in_the_air(stage: Any, stand_ins
     assert shown_m == pytest.approx(0.45e-3, abs=5.0 * 0.032e-3)
     assert "its sensor is stuck, or the leg walks in the air" in status["foot_load"].message
     walking.end()
-
-
-def test_joint_states_are_those_of_joint_state_broadcaster(stage: Any, stand_ins: Any) -> None:
-    """As its tests have it: all three fields of each joint of the URDF, NaN for what is not measured."""
-    pytest.importorskip("control_msgs")
-    heard = stage.listen("joint_states", JointState, matched=False)
-    joints = stand_ins.JointStateBroadcaster(context=stage.node.context)
-    states = {"leg_crank": {"position": 1.0, "motor_current": 2.0}, "hip_yaw": {"position": 3.0}}
-    stage.wait_for(lambda: joints.count_subscribers("joint_states") > 0, "a subscriber")
-    stage.wait_for(lambda: heard or joints.update(5_000_000_001, states), "a message")
-    assert heard[0].header.frame_id == "base_link"
-    assert (heard[0].header.stamp.sec, heard[0].header.stamp.nanosec) == (5, 1)
-    assert list(heard[0].name) == ["hip_yaw", "leg_crank"]
-    assert list(heard[0].position) == [3.0, 1.0]
-    assert all(math.isnan(value) for value in [*heard[0].velocity, *heard[0].effort])
-    joints.destroy_node()
 
 
 def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> None:

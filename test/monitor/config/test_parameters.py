@@ -132,6 +132,13 @@ UNFIT = [
     ({"clearances_m": [0.02]}, ["clearances_m", "joint A", "0.02", "bushing_radius"]),
     ({"limits.joint_clearance_m": [6.0e-4]}, ["limits.joint_clearance_m", "1 values", "one each"]),
     ({"wear_coefficients_per_pa": [1e-15, 1e-15]}, ["wear_coefficients_per_pa", "2 values"]),
+    ({"encoders.names": ["hip"]}, ["encoders.joints: has 0 values for 1 encoders"]),
+    ({"encoders.names": ["a", "a"], "encoders.joints": ["B", "G"]}, ["not different names"]),
+    ({"encoders.names": list("abcde"), "encoders.joints": list("ABGIJ")}, ["at most 4"]),
+    (
+        {"encoders.names": ["a"], "encoders.joints": ["B"], "encoders.signs": [0.5]},
+        ["not all 1.0 or -1.0"],
+    ),
 ]
 
 

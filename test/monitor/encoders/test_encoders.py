@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reported import status_of
 
-from leg_wear_monitor import ConfigError, WearMonitor
+from leg_wear_monitor import WearMonitor
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.encoders import errors_of
@@ -218,23 +218,6 @@ def test_other_encoders_are_commissioned_again_and_the_same_ones_are_not(begin, 
 def kept(tmp_path):
     with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
         return read_records(db, Commissioned)[-1]
-
-
-@pytest.mark.parametrize(
-    "values, fault",
-    [
-        ({"encoders.names": ["hip"]}, "encoders.joints: has 0 values for 1 encoders"),
-        ({"encoders.names": ["a", "a"], "encoders.joints": ["B", "G"]}, "not different names"),
-        ({"encoders.names": list("abcde"), "encoders.joints": list("ABGIJ")}, "at most 4"),
-        (
-            {"encoders.names": ["a"], "encoders.joints": ["B"], "encoders.signs": [0.5]},
-            "not all 1.0 or -1.0",
-        ),
-    ],
-)
-def test_parameters_that_cannot_be_are_refused(values, fault):
-    with pytest.raises(ConfigError, match=fault):
-        config_from(values)
 
 
 def test_without_encoders_there_is_nothing_new(monitor, gait):

@@ -9,10 +9,8 @@ from reported import raised, status_of
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import (
-    EMPTY,
     MISSING_JOINT,
     NO_FAULT,
-    ZERO_STAMP,
     TrackerSettings,
     gait_samples,
 )
@@ -181,22 +179,6 @@ def test_a_gear_that_is_not_set_is_named(monitor, gait):
     monitor.update(samples)
     message = status_of(monitor, "input").message
     assert "crank.gear_ratio" in message and "degrees" not in message
-
-
-def test_why_samples_cannot_be_used_is_said_and_the_most_frequent_fault_is_not_taken_for_all(monitor, gait):
-    """The number of all stands before it, and is that of the alarm's fraction; reported while it lasts."""
-    stream = gait(2.0)
-    stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
-    monitor.update(stream)
-    status = status_of(monitor, "input")
-    every, first = status.message.split(" samples are not used; most frequent fault: ")
-    unused, total = (int(number) for number in every.split(" of "))
-    assert "set header.stamp" in first
-    assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))
-    fraction = next(alarm.value for alarm in monitor.alarms.alarms if alarm.name == "input_samples")
-    assert unused / total == pytest.approx(fraction)
-    monitor.update(gait(3.0, begin_s=2.0))
-    assert "zero stamp" not in status_of(monitor, "input").message
 
 
 def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gait):

@@ -1,6 +1,5 @@
 """Ideal motion: published and independently computed cycles, and the laws between its parts."""
 
-
 import attrs
 import numpy as np
 import pytest

@@ -287,13 +287,5 @@ def test_it_holds_the_share_and_nothing_narrower_does(depth, fraction):
     assert max(narrower) < fraction * depth.sum()
 
 
-@given(start=st.integers(0, N - 1), length=st.integers(1, N - 1))
-def test_a_box_is_found_where_it_is(start, length):
-    """All of an even wear is just where it is, across 0 deg too."""
-    depth = np.zeros(N)
-    depth[np.arange(start, start + length) % N] = 1.0
-    assert wear_zone(depth, 1.0) == pytest.approx((start * 360.0 / N, (start + length) * 360.0 / N))
-
-
 def test_no_zone_without_wear():
     assert wear_zone(np.zeros(N)) is None

@@ -1,6 +1,5 @@
 """Bad input of every kind: no crash, no wear, each sample counted under a name."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

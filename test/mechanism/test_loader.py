@@ -54,15 +54,25 @@ def test_whatever_a_file_holds_instead_is_told_in_one_line(junk):
         mechanism_of(junk)
 
 
-@given(data=st.data())
-def test_a_key_that_is_not_known_is_never_passed_over(data):
-    original = ORIGINALS["bionic_leg"]
-    mappings = [("bodies", "foot"), ("joints", "A"), ("drive",), ("clearances",), ("clearances", "defaults")]
-    path = data.draw(st.sampled_from([*mappings, ("clearances", "defaults", "friction")]))
-    with pytest.raises(lw.ConfigError) as caught:
-        mechanism_of(changed(original, (*path, "colour"), data.draw(JUNK)))
-    assert caught.value.key == ".".join((*path, "colour"))
-    assert caught.value.fault.startswith("unknown key")
+@pytest.mark.parametrize(
+    "path",
+    [
+        "bodies.rocker",
+        "joints.A",
+        "drive",
+        "clearances",
+        "clearances.defaults",
+        "clearances.defaults.friction",
+    ],
+)
+def test_a_key_that_is_not_known_is_never_passed_over(path):
+    """Whatever its value is."""
+    original = document_of("four_bar")
+    for value in (None, 1.0, "red", [], {"red": 1}):
+        with pytest.raises(lw.ConfigError) as caught:
+            mechanism_of(changed(original, (*path.split("."), "colour"), value))
+        assert caught.value.key == f"{path}.colour"
+        assert caught.value.fault.startswith("unknown key")
 
 
 def test_all_that_come_with_the_package_load():

@@ -395,12 +395,14 @@ class Explainer:
         at = changes.at(tried.ravel(), of)[0].reshape(*tried.shape, -1)
         variance = changes.scatter_at(tried.ravel(), of).reshape(tried.shape).sum(axis=1)
         change, scatter = at[:-1] - at[-1], seen.scatter + variance[:-1] - variance[-1]
-        near = _nearby(change)
-        error = np.square(_relative_error(values, counted)[:, :, None] * near).sum(axis=1)
+        near, relative = _nearby(change), _relative_error(values, counted)
+        error = np.square(relative[:, :, None] * near).sum(axis=1)
         if len(which) > 1:
             error += _TOGETHER**2 * near.prod(axis=1)
+        # the shape is as uncertain as the size: otherwise a wide second opening explains where one is wrong
+        shape = self.error(change.reshape(-1, change.shape[-1]), _NOISE_OF_NAMES).reshape(relative.shape)
+        scatter = scatter + (shape * np.square(relative / MODEL_ERROR)).sum(axis=1)
         together = change.sum(axis=1)
-        scatter = scatter + self.error(together, _NOISE_OF_NAMES)
         own = seen.covariance + scatter[:, None, None] * self.model.covariance
         return Misfits(seen.rest - together, own + _diagonal(np.sqrt(error)))
 

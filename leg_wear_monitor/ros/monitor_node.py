@@ -211,7 +211,7 @@ class MonitorNode(ClosingNode):
         """Open the ledger and set up everything else; close the ledger if that fails."""
         config = parameters.config
         kept, log = Path(config.ledger.path).absolute(), self.get_logger()
-        ledger = f"ledger {kept} is {'continued' if kept.exists() else 'begun'}"
+        ledger = f"ledger {kept} is {'continued' if kept.exists() else 'new'}"
         self._monitor = open_monitor(load_mechanism(config.mechanism), config)
         log.info(
             ledger

@@ -51,7 +51,7 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
     said = logs["monitor"].read_text()
     for line in (
         "The monitor advises.",
-        f"ledger {ledger} is begun",
+        f"ledger {ledger} is new",
         "of bionic_leg at 60 rpm, hardware leg",
         f"no topic of this node has the parameter {unused}; did you mean qos_overrides./joint_states",
         f"{other}: this file is not used: its sections are for /monitor, and this node is /leg_wear_monitor",

@@ -47,6 +47,7 @@ TYPES = {
     "verdict": DiagnosticArray,
 }  # fmt: skip
 LATCHED = ("alarms", "verdict", "state")
+NO_DATA = "no current data"  # start of a message of a node that receives nothing
 SERVICES = {
     "acknowledge_alarms": Trigger, "save_state": Trigger, "reset_wear/G": Trigger, "undo_reset/G": Trigger,
     "measure": SetParametersAtomically,
@@ -213,7 +214,9 @@ def scene(leg, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
         diagnostics = person.heard["/diagnostics"]
         person.wait(
             lambda: any(
-                "no current data" in repr(each) and "left" in repr(each) for each in diagnostics[-5:]
+                one.name.startswith("left") and one.level == b"\x02" and one.message.startswith(NO_DATA)
+                for array in diagnostics[-5:]
+                for one in array.status
             ),
             "the report of the silence",
         )
@@ -306,7 +309,7 @@ def test_silence_is_an_error_and_never_stale(scene: Scene) -> None:
         status
         for array in scene.heard["/diagnostics"]
         for status in array.status
-        if status.message.startswith("no current data")
+        if status.message.startswith(NO_DATA)
     ]
     # from the start it is a warning at first
     assert {status.level for status in silent if status.name.startswith("left")} >= {b"\x02"}

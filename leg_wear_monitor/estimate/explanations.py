@@ -54,10 +54,10 @@ _NOISE_ALONE = 2.0
 _SURE_SQUARE, _SURE_BY = 2.0, 100.0
 _ANYTHING_ELSE = "something else"
 
-# mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
-# linear columns can show and a leg can have
-# or this fraction of the residual without it, because a large opening is known less precisely
+# An explanation does not explain if it leaves a larger mean square than this (docs/explanation/diagnosis.md),
+# and more than this fraction of the mean square without it: a large opening is known less precisely.
 POOREST, _PART = 4.0, 0.3
+# values that linear columns can show and a leg can have
 _POSSIBLE = {
     Cause.MASS: (-0.9, 0.95),  # not at the end of the tried factors, where a larger clearance may stay hidden
     Cause.LENGTH: (-0.1, 0.1),

@@ -32,6 +32,24 @@ PHASE_RAD = 0.03
 SIGMA = 0.04  # fraction of the scale: joints with clearance leave a tenth of the torque unexplained
 
 
+def random_robot(seed: int) -> Robot:
+    rng = np.random.default_rng(seed)
+    gear = float(rng.choice([1.0, 1.0, 0.5, 6.25, 9.0, 27.5, 50.0, 100.0]))
+    return Robot(
+        sign=int(rng.choice([1, -1])),
+        gear_ratio=gear,
+        offset_rad=float(rng.uniform(-3.0, 3.0)),
+        source=str(rng.choice([WRENCH, EFFORT, FLOAT64])),
+        axis=str(rng.choice(list("xyz"))),
+        torque_sign=int(rng.choice([1, -1])),
+        scale=float(rng.choice([1.0, 0.8, 4.448, 1.0e-3])),
+        angle_noise_rad=float(rng.choice([1.0e-4, 1.0e-3, 3.0e-3])),
+        torque_noise_nm=float(rng.choice([0.05, 0.3, 1.0])),
+        is_wrapped=gear == 1.0 and bool(rng.integers(2)),
+        seed=seed,
+    )
+
+
 def angle_between(a: float, b: float) -> float:
     return abs((a - b + math.pi) % TURN - math.pi)
 
@@ -77,6 +95,15 @@ def test_the_parameters_of_a_robot_come_back(name: str, walked: Walk, record: Re
     check(robot, result, walked.time_s[-1])
     assert result.config is not None
     assert (result.config.drive_torque.interface == "motor_current") == (name == "current")
+
+
+@pytest.mark.slow  # the test before holds it for a robot of each source
+@pytest.mark.parametrize("seed", range(10))
+def test_ten_robots(seed: int, walked: Walk, record: Record, tmp_path: Path) -> None:
+    robot = random_robot(seed)
+    result = commission(record(tmp_path / "robot.mcap", robot, walked))
+    assert not result.faults and not result.findings
+    check(robot, result, walked.time_s[-1])
 
 
 def signals_of(robot: Robot, walk: Walk) -> Signals:

@@ -1,5 +1,7 @@
 """Bad input of every kind: no crash, no wear, each sample counted under a name."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -23,12 +25,19 @@ kinds = st.sampled_from([CRANK, TORQUE])
 faulty = st.tuples(stamps, kinds, faults, numbers, numbers, numbers)
 not_finite = st.tuples(stamps, st.just(CRANK), st.just(NO_FAULT), odd_numbers, numbers, numbers)
 stampless = st.tuples(st.sampled_from([0, -1, -(2**63)]), kinds, st.just(NO_FAULT), numbers, numbers, numbers)
+anything = st.tuples(stamps, kinds, faults | st.just(NO_FAULT), numbers, numbers, numbers)
 
 
 def block(samples):
     stamp, kind, fault, angle, velocity, torque = zip(*samples, strict=True)
     values = {"crank_angle_rad": angle, "crank_velocity_radps": velocity, "torque_nm": torque}
     return lw.gait_samples(np.array(stamp, np.int64), kind, fault=fault, **values)
+
+
+def counted(monitor):
+    lost = monitor.lost
+    dropped = lost.duplicates + lost.late + lost.stray_stamps + lost.outliers
+    return sum(lost.faulty.values()) + dropped + sum(monitor.used.values())
 
 
 @settings(max_examples=20)
@@ -42,6 +51,19 @@ def test_samples_that_cannot_be_used_are_counted_by_name_and_wear_nothing(new_mo
     assert len(reports.lost.faulty) == len(FAULTS)
     shown = status_of(monitor, "input").values
     assert sum(value for key, value in shown.items() if key.startswith("faulty_")) == len(samples)
+
+
+@settings(max_examples=20)
+@given(st.lists(anything, min_size=1, max_size=300))
+def test_nothing_that_comes_breaks_the_monitor(new_monitor, samples):
+    monitor = new_monitor()
+    monitor.update(block(samples))
+    depth = monitor.wear_depth_m
+    assert np.isfinite(depth).all()
+    assert (depth >= 0.0).all()
+    assert status_of(monitor, "input").values["received"] == len(samples)
+    assert counted(monitor) <= len(samples)
+    monitor.status()
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +128,22 @@ def test_a_stream_of_nothing_else_is_named_and_alarmed(new_monitor, gait, name, 
     assert status.values["received"] == len(stream)
     assert raised(monitor) & {"input_samples", "input_gaps"}, reports.lost
     assert status.level == ERROR
+
+
+def test_the_stream_with_values_that_are_no_numbers_is_named_with_their_number(new_monitor, gait):
+    """Found by the twin in the crank's angle, and by the reader of messages in the torque."""
+    crank, torque = gait(4.0), gait(4.0)[::2].copy()
+    crank["crank_angle_rad"][::3] = np.inf
+    torque["kind"], torque["crank_angle_rad"], torque["torque_nm"] = TORQUE, np.nan, 1.0
+    torque["fault"][::4] = NOT_FINITE
+    stream = np.concatenate([crank, torque])
+    monitor = new_monitor()
+    monitor.update(stream[np.argsort(stream["stamp_ns"], kind="stable")])
+    pattern = r"(\d+) of \d+ samples have a value .* infinite \((\d+) of the crank, (\d+) of drive_torque\)"
+    found = re.search(pattern, status_of(monitor, "input").message)
+    every, of_crank, of_torque = map(int, found.groups())
+    assert every == of_crank + of_torque
+    assert of_crank / of_torque == pytest.approx(8 / 3, rel=0.1)  # a third of the samples, an eighth
 
 
 @pytest.mark.parametrize("spoil", [lambda s: spoiled(s, crank_angle_rad=1.0), lambda s: s[:1]])

@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.full_run import (
     BAUMGARTE,
+    TOLERANCE_M,
     FullRun,
     accelerate,
     add_contacts,
@@ -222,6 +223,15 @@ def test_the_feed_forward_follows_the_phase_of_the_wanted_motion():
     assert statistics.drive_integral[TORQUE] * SPEED / TURN == pytest.approx(mean, rel=1.0e-6)
 
 
+def test_without_gains_it_is_a_constant_torque(document):
+    constant = document("four_bar")
+    constant["drive"] = {"body": "crank", "torque": -0.3, "initial_speed": SPEED}
+    tracked = _tracked(document, "four_bar", feed_forward_nm=-0.3)
+    a, b = (_advance(parse_mechanism(one, "four_bar"), 0.6)[0] for one in (tracked, constant))
+    assert abs(a.q[1, 2] - 0.6 * SPEED) > 0.1  # it has left the motion to follow
+    np.testing.assert_allclose(a.state.y, b.state.y, rtol=0.0, atol=1.0e-9)
+
+
 def test_high_gains_tend_to_a_constant_speed(document):
     """Ten times the gains, a tenth of the error; the torque tends to that of the ideal linkage."""
     errors, torques = [], []
@@ -237,6 +247,22 @@ def test_high_gains_tend_to_a_constant_speed(document):
     steady["drive"] = {"body": "crank", "speed": SPEED}
     wanted = _advance(parse_mechanism(steady, "four_bar"), 1.0)[0].sample().drive_torque
     assert torques[2] == pytest.approx(wanted, rel=5.0e-3)
+
+
+def test_the_ideal_torque_as_feed_forward_leaves_little_to_the_gains(document):
+    steady = document("four_bar")
+    steady["drive"] = {"body": "crank", "speed": SPEED}
+    linkage = prepare(parse_mechanism(steady, "four_bar"), clearances=()).linkage
+    table = {
+        "feed_forward_nm": one_cycle(linkage, 128, SPEED).drive_torque.tolist(),
+        "feed_forward_phase": (np.arange(128) / 128).tolist(),
+    }
+    gains = {"kp_nm_per_rad": 2.0, "kd_nm_s_per_rad": 0.1}
+    bare, fed = (
+        _advance(parse_mechanism(_tracked(document, "four_bar", **gains, **more), "four_bar"), 1.0)[0]
+        for more in ({}, table)
+    )
+    assert abs(fed.q[1, 2] - SPEED) < 1.0e-3 * abs(bare.q[1, 2] - SPEED)
 
 
 @pytest.mark.parametrize("clearances", [(), ("B",)])
@@ -329,10 +355,11 @@ def test_a_vanishing_clearance_is_an_ideal_joint(leg_cycles, leg, linkage_of):
     assert abs(surplus[-1, 4]) < 0.2 * wanted[4]
 
 
-def _drift(leg, clearance_joints, seconds):
+def _drift(leg, clearance_joints, seconds, baumgarte, tolerance_m=TOLERANCE_M):
     """Largest residual [m, rad] and its rate in each second of a run, looked at 100 times."""
     setup = prepare(leg, clearances=clearance_joints)
-    run, statistics = FullRun(setup), new_run_statistics(len(leg.joints))
+    run, statistics = FullRun(setup, tolerance_m=tolerance_m), new_run_statistics(len(leg.joints))
+    run.model = run.model._replace(baumgarte=baumgarte)
     rows, n = run.model.rows, len(run.q)
     phi, blocks, gamma = np.empty(len(rows.body)), np.zeros((len(rows.body), 2, 3)), np.empty(len(rows.body))
     cs, drift = np.empty((n, 2)), np.zeros((seconds, 2))
@@ -349,6 +376,13 @@ def _drift(leg, clearance_joints, seconds):
 @pytest.mark.parametrize("clearance_joints", ["", "ABGIJ"])
 def test_closures_stay_closed(leg, clearance_joints):
     """Below 1e-8 m and 1e-6 m/s over several cycles, without a trend."""
-    drift = _drift(leg, tuple(clearance_joints), 4)
+    drift = _drift(leg, tuple(clearance_joints), 4, BAUMGARTE)
     assert (drift < [1.0e-8, 1.0e-6]).all()
     assert drift[-1, 0] < 3.0 * drift[0, 0]
+
+
+def test_closures_drift_apart_without_baumgarte(leg):
+    """At ten times the default's step error, so that four seconds show it."""
+    drift = _drift(leg, tuple("ABGIJ"), 4, 0.0, 10.0 * TOLERANCE_M)[:, 0]
+    assert drift[-1] > 3.0 * drift[0]
+    assert drift[-1] > 1.0e-8

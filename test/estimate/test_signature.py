@@ -14,6 +14,7 @@ from leg_wear_monitor.estimate.signature import (
     PhaseMeans,
     SimulatedSensor,
     TorqueSensor,
+    averaged,
     quiet_phases,
     signature_of_torque,
     signatures,
@@ -133,6 +134,10 @@ def test_a_torque_that_is_added_is_shown_as_the_leg_s_own_is(leg, rpm, rate_hz, 
     np.testing.assert_allclose(shown[: sensor.phases], measured[: sensor.phases], atol=12.0 / sensor.samples)
     added = SimulatedSensor(reference, 8, sensor).slope(0, torque(np.arange(240) * TURN / 240), 0.1)
     np.testing.assert_allclose(added[: sensor.phases], measured[: sensor.phases], atol=12.0 / sensor.samples)
+
+
+def test_averaging_keeps_the_mean_of_whole_groups() -> None:
+    np.testing.assert_array_equal(averaged(np.arange(7.0), 3), [1.0, 4.0])
 
 
 def test_quiet_phases_are_the_calmest_third() -> None:

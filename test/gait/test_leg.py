@@ -57,6 +57,15 @@ def test_friction_of_the_drive_adds_to_its_torque() -> None:
     assert braked - plain == pytest.approx(1.5, rel=1e-9)
 
 
+def test_a_push_of_the_ground_changes_the_torque() -> None:
+    """By its work over the way of the toe: a tenth of a turn moves it some centimetres up or down."""
+    plain, pushed = (SyntheticLeg(GaitConfig(load=LoadConfig(ground_n=force))) for force in (0.0, 100.0))
+    changes = [
+        pushed.advance(t).torque_impulse - plain.advance(t).torque_impulse for t in (0.1, 0.2, 0.3, 0.4, 0.5)
+    ]
+    assert np.ptp(changes) > 0.1
+
+
 def test_the_truth_has_an_entry_a_cycle() -> None:
     leg = SyntheticLeg(GaitConfig(wear_acceleration=1.0e4))
     leg.advance(2.5)

@@ -248,6 +248,14 @@ def test_the_constants_hold_for_their_range_only() -> None:
     assert math.isnan(rating_life_hours(1.01e6, constants))
 
 
+def test_above_the_least_value_the_life_falls_with_p_v() -> None:
+    constants = lw.load_material("skf-ptfe-composite-on-steel").rating_life
+    assert constants is not None
+    one, two = (rating_life_hours(pv, constants) for pv in (0.1e6, 0.2e6))
+    assert one == pytest.approx(4800.0)
+    assert one / two == pytest.approx(2.0**constants.exponent.si)
+
+
 def test_joints_that_swing_have_limits_of_their_own() -> None:
     """iglidur H: 196 ft/min where it turns, 137 ft/min where it swings; A and B are the crank's."""
     document = document_of("bionic_leg")

@@ -121,6 +121,13 @@ def test_at_the_limit_nothing_remains_whatever_else():
     assert result.leg.first_probability == {"B": 0.0, "A": 1.0}
 
 
+def test_a_leg_of_one_joint_lasts_as_long_as_it():
+    result = whole([NOW])
+    assert result.leg.cycles == result.joints[0].cycles
+    assert result.leg.days == result.joints[0].days
+    assert (result.leg.first, result.leg.first_probability) == ("A", {"A": 1.0})
+
+
 def test_a_leg_ends_with_the_first_of_two_lognormal_lives():
     """The smaller of two; the probability that it is A's is that of a difference of normals."""
     result = whole([NOW, B], SURE).leg
@@ -131,6 +138,13 @@ def test_a_leg_ends_with_the_first_of_two_lognormal_lives():
     lives = np.array([[2e7], [6e7]]) / np.exp(USUAL_SPREAD * random.standard_normal((2, 200_000)))
     expected = np.quantile(lives.min(axis=0), (0.1, 0.5, 0.9))
     np.testing.assert_allclose(attrs.astuple(result.cycles), expected, rtol=0.03)
+
+
+def test_a_joint_without_a_growth_rate_leaves_the_leg_partly_known():
+    result = whole([NOW, attrs.evolve(B, growth_m=None)])
+    assert [each.answer for each in result.joints] == [Answer.KNOWN, Answer.NOT_ENOUGH_DATA]
+    assert result.leg.answer is Answer.PARTLY_KNOWN
+    assert result.leg.cycles == result.joints[0].cycles
 
 
 def test_a_joint_without_a_growth_rate_does_not_end_the_leg_by_what_its_clearance_may_be():
@@ -190,6 +204,25 @@ def found(wear, mm, earlier=(), **more):
     return forecaster.measured(wear, clearance_m=1e-3 * mm, **given)
 
 
+def test_without_a_measurement_the_belief_is_the_lognormal_prior():
+    coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
+    assert coefficient_estimate.mean == pytest.approx(0.0, abs=1e-12)
+    assert coefficient_estimate.sigma == pytest.approx(USUAL_SPREAD, rel=1e-3)
+    z = statistics.NormalDist().inv_cdf(0.9)
+    assert coefficient_estimate.log_factors(0.9) == pytest.approx(USUAL_SPREAD * z, rel=1e-3)
+
+
+@given(st.floats(0.3, 3.0))
+def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
+    exact = attrs.evolve(PRIOR, new_clearance_sigma=1e-7 / FRESH)
+    wear = 1e-4
+    coefficient_estimate = estimate_coefficient(
+        exact, FRESH, [ClearanceAtWear(FRESH + factor * wear, 5e-6, wear)]
+    )
+    assert math.exp(coefficient_estimate.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
+    assert coefficient_estimate.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
+
+
 @given(st.floats(-3.0, 3.0), st.floats(-7.0, -4.0))
 def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(power, sigma_power):
     """Two measurements of one part: their difference is the factor times the wear between them."""
@@ -239,6 +272,14 @@ def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coeffic
     # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
     np.testing.assert_allclose(coefficient_estimate.excess_m, 2.5e-6)
     assert coefficient_estimate.excess_sigma_m == pytest.approx(5e-6 / math.sqrt(2.0))
+
+
+def test_a_later_measurement_knows_the_clearance_when_new():
+    alone = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.5e-4, 2e-6, 5e-5)])
+    both = estimate_coefficient(
+        PRIOR, FRESH, [ClearanceAtWear(3.0e-4, 2e-6, 0.0), ClearanceAtWear(3.5e-4, 2e-6, 5e-5)]
+    )
+    assert both.sigma < 0.7 * alone.sigma
 
 
 def test_measurements_that_repeat_the_same_model_are_expected_evenly():

@@ -63,6 +63,14 @@ def test_only_the_last_cycles_count():
     assert growth_rate(window(growths)).per_cycle_m == pytest.approx(1.0e-12)
 
 
+@given(st.lists(st.floats(1e-14, 1e-9), min_size=LEAST_CYCLES, max_size=60))
+def test_what_is_said_adds_up(growths):
+    found = window(growths, cycles=100)
+    rate = growth_rate(found)
+    if rate is not None:
+        assert rate.per_cycle_m * len(growths) == pytest.approx(sum(growths), rel=1e-9)
+
+
 def covered(random, correlation, cycles, legs=1500):
     """Fraction of 80 % intervals that hold the truth, 1: growth that hangs together from cycle to cycle."""
     scatter = random.standard_normal((legs, cycles))
@@ -76,6 +84,17 @@ def covered(random, correlation, cycles, legs=1500):
 @pytest.mark.parametrize(("correlation", "cycles"), [(0.0, 10), (0.0, 30), (0.3, 60), (0.6, 300)])
 def test_an_interval_of_80_percent_holds_the_truth_in_80_percent(correlation, cycles):
     assert covered(np.random.default_rng(7), correlation, cycles) == pytest.approx(0.8, abs=4.0 * 0.0103)
+
+
+def test_the_interval_narrows_with_the_square_root_of_the_window():
+    random = np.random.default_rng(8)
+
+    def width(cycles):
+        growth = 1.0 + 0.15 * random.standard_normal((400, cycles))
+        return np.mean([growth_rate(GrowthWindow(row, np.ones(cycles))).sampling_m for row in growth])
+
+    # 400 standard errors of four degrees of freedom: each scatters by 0.36, their mean by 0.018
+    assert width(30) / width(270) == pytest.approx(3.0, rel=4.0 * 0.018 * 2.0**0.5)
 
 
 def test_scatter_and_model_are_independent():
@@ -128,6 +147,19 @@ def test_one_joint_whose_growth_rises_with_its_clearance_has_a_closed_form():
     # integral of (c / c_0)^-b dc over growth when new
     expected = FRESH[0] / 0.2 * ((LIMIT[0] / FRESH[0]) ** 0.2 - 1.0) / BASE[0]
     assert cycles == pytest.approx(expected, rel=1e-3)
+
+
+@given(st.floats(0.05, 20.0), factors)
+def test_all_factors_alike_only_change_the_pace(pace, factor):
+    np.testing.assert_allclose(one(base=pace * factor * BASE), one(base=factor * BASE) / pace, rtol=1e-9)
+
+
+@given(factors, st.integers(0, 2), st.floats(1.01, 1.5))
+def test_a_wider_limit_is_reached_later(factor, k, wider):
+    limit = LIMIT.copy()
+    limit[k] *= wider
+    base = factor * BASE
+    assert one(base=base, limit=limit)[k] > one(base=base)[k]
 
 
 @given(factors)
@@ -251,6 +283,11 @@ def test_what_impacts_make_is_less_sure():
     even, more, all_of_it = (model.relative(0, growth_m) for growth_m in (1.0e-11, 2.0e-11, 1.0e-6))
     assert even == pytest.approx(0.6 * MASS_TOLERANCE)
     assert even < more < all_of_it < 3.0 * even
+
+
+def test_no_growth_has_no_error_by_impacts():
+    model = ModelError(np.array([1.0e-11]), np.array([0.6]), np.zeros(1))
+    assert model.relative(0, 0.0) == 0.6 * MASS_TOLERANCE
 
 
 @pytest.mark.parametrize(("peak_n", "simulated"), [(300.0, (2.6, 6.0, 4.2)), (600.0, (4.6, 7.9, 6.1))])

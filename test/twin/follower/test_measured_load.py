@@ -129,6 +129,19 @@ def test_a_force_along_the_axes_of_the_foot_is_turned(leg, gait, stance):
     assert cycle.load.largest_n == pytest.approx(PEAK_N, rel=0.01)
 
 
+def test_blocks_change_nothing(leg, gait, stance):
+    walk, seen = pushed(gait(2.7), stance, 250.0), []
+    for split in ([], range(1, len(walk), 37)):
+        twin = DigitalTwin(leg, MEASURED)
+        cycles = [one for block in np.split(walk, split) for one in twin.update(block).cycles]
+        seen.append((cycles, twin.depth, twin._load.acting_n))
+    for one, other in zip(seen[0][0], seen[1][0], strict=True):
+        np.testing.assert_array_equal(one.archard_j, other.archard_j)
+        np.testing.assert_array_equal(one.load.force_n, other.load.force_n)
+    np.testing.assert_array_equal(seen[0][1], seen[1][1])
+    np.testing.assert_array_equal(seen[0][2], seen[1][2])
+
+
 def test_other_parameters_leave_the_force_where_it_is(twin, gait, stance):
     walk = pushed(gait(3.0), stance, 200.0)
     twin.update(walk)

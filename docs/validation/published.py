@@ -39,7 +39,7 @@ def row(*cells: str) -> None:
 
 
 def andrews() -> None:
-    wanted = case("dynamics/test_benchmarks.py")
+    wanted = case("dynamics/test_full.py")
     print("\n### Andrews' squeezing mechanism\n")
     table(
         "local error [m, rad]",
@@ -69,7 +69,7 @@ def andrews() -> None:
 
 
 def slider_crank() -> None:
-    wanted = case("dynamics/test_benchmarks.py")["IMPACTS"]
+    wanted = case("dynamics/test_full.py")["IMPACTS"]
     print("\n### Slider-crank with clearance in the pin\n")
     table("local error [m]", "impact", "begins [ms]", "speed [m/s]", "ends [ms]", "peak [N]")
     for i, (begin, speed, end, peak) in enumerate(wanted, start=1):
@@ -92,7 +92,7 @@ def slider_crank() -> None:
 
 
 def restitution() -> None:
-    dropped = case("contact/test_normal.py")["dropped"]
+    dropped = case("contact/test_contact.py")["dropped"]
     print("\n### Delivered restitution for a requested one\n")
     laws = [name for name, law in LAWS.items() if law.form is HERTZ and name != "hertz"]
     table("requested", *laws)
@@ -134,10 +134,10 @@ def archard() -> None:
 def ideal() -> None:
     jansen = build_linkage(load_mechanism("jansen_leg"))
     foot = point_motion(one_cycle(jansen, 8, 1.0), jansen, *jansen.mechanism.toe)[0] / 0.008 + [38.0, 7.8]
-    wanted = case("mechanism/test_ideal.py")["JANSEN_FOOT"]
+    wanted = case("mechanism/test_kinematics.py")["JANSEN_FOOT"]
     print(f"\n### Jansen\n\nLargest error of the foot: {np.abs(foot - wanted).max():.1e} of his units.")
 
-    test = case("mechanism/test_ideal.py")
+    test = case("mechanism/test_kinematics.py")
     foot = test["klann_foot"](build_linkage(load_mechanism("klann_leg")))
     off, (height, deviation) = foot[[0, 180]] - [(1.0, 0.0), (0.0, 0.0)], test["klann_step"](foot)
     print(f"\n### Klann\n\nLargest error of the foot: {np.abs(off).max():.1e} units of the patent.")

@@ -1,6 +1,4 @@
-"""Full coordinates: their equations, the motion, and what it must do whatever the leg."""
-
-import math
+"""Full coordinates: published motions, their equations, and the motion whatever the leg."""
 
 import numpy as np
 import pytest
@@ -8,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.full_run import (
     BAUMGARTE,
@@ -22,28 +21,107 @@ from leg_wear_monitor.dynamics.full_run import (
 from leg_wear_monitor.dynamics.joint import joint_force
 from leg_wear_monitor.dynamics.run import (
     ARCHARD,
-    DISSIPATION,
     FRICTION,
     JOINT_RATES,
     POWER,
-    TORQUE,
     new_run_statistics,
     steady_drive,
 )
-from leg_wear_monitor.dynamics.simulation import prepare, simulate
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import closures, closures_at, rotations
-from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, dense_jacobian, one_cycle
 from leg_wear_monitor.wear import SECTORS, Surfaces
 
-# Full coordinates: their equations, and the motion.
+# Published motions: Andrews' squeezing mechanism, and a slider-crank with clearance in the pin.
+
+
+# IVP Test Set, problem "andrews", at t = 0.03 s: beta, Theta, gamma, phi, delta, Omega, epsilon [rad]
+ANDREWS_ANGLES = [
+    15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948,
+    0.5244099658805304, 0.5347301163226948, 1.048080741042263,
+]  # fmt: skip
+# and the force that body 2 meets in each joint of the pin P [N]
+ANDREWS_FORCES = {
+    "P23": (199.1753333731910, -29.75531228015052),
+    "P24": (23.06654341098399, 31.45271365475927),
+    "P26": (22.64249232082739, 11.61740699100673),
+}
+
+# slider-crank with Lankarani-Nikravesh: impacts begin [ms], speed [m/s], end [ms], peak [N], by RK4 at 5 ns
+IMPACTS = [
+    (0.22729, 4.38586, 0.28073, 45872.0),
+    (0.63706, 2.75699, 0.69090, 20870.0),
+    (0.74971, 1.82696, 0.81516, 25926.0),
+    (1.08596, 1.10188, 1.14672, 6558.0),
+    (1.20583, 0.82381, 1.49090, 12916.0),
+]
+ROTATION = 5000.0 * 2.0 * np.pi / 60.0
+
+
+@pytest.fixture(scope="module")
+def andrews():
+    """The run at its end, and what it added up."""
+    run, statistics = FullRun(prepare(load_mechanism("andrews")), tolerance_m=1.0e-11), new_run_statistics(10)
+    start = run.stored_energy
+    run.advance(0.03, statistics)
+    return run, statistics.drive_integral[POWER], run.stored_energy - start
+
+
+def test_andrews_angles(andrews):
+    theta = andrews[0].q[:, 2]
+    got = [
+        theta[1],
+        theta[2] - theta[1],
+        theta[3],
+        theta[4] - theta[5],
+        theta[5],
+        theta[6] - theta[7],
+        theta[7],
+    ]
+    np.testing.assert_allclose(got, ANDREWS_ANGLES, atol=1.0e-6)
+
+
+def test_andrews_reactions(andrews):
+    run = andrews[0]
+    names = list(load_mechanism("andrews").joints)
+    row = {names[joint]: r for joint, r in zip(run.model.rows.closure, run.model.rows.row, strict=True)}
+    for joint, force in ANDREWS_FORCES.items():
+        got = run.lam[row[joint] : row[joint] + 2]
+        assert np.linalg.norm(got - force) < 1.0e-4 * np.linalg.norm(force)
+
+
+def test_andrews_keeps_its_energy(andrews):
+    """Ideal joints lose nothing: the torque's work is kinetic energy and that of the spring."""
+    _, work, stored = andrews
+    assert stored == pytest.approx(work, rel=1.0e-9)
+
+
+def test_slider_crank_without_clearance(linkage_of):
+    """At the outer dead centre the slider's acceleration is r omega^2 (1 + r / l)."""
+    motion = one_cycle(linkage_of("slider_crank"), 1, ROTATION)
+    assert -motion.a[0, 3, 0] == pytest.approx(0.05 * ROTATION**2 * (1.0 + 0.05 / 0.12), rel=1.0e-9)
+    assert -motion.a[0, 3, 0] == pytest.approx(19419.0, abs=0.5)
+
+
+def test_slider_crank_impacts():
+    run, statistics = (
+        FullRun(prepare(load_mechanism("slider_crank")), tolerance_m=1.0e-12),
+        new_run_statistics(4),
+    )
+    run.advance(1.5e-3, statistics)
+    assert statistics.impacts[2] == len(IMPACTS)
+    for got, (begin, speed, end, peak) in zip(statistics.impact[2], IMPACTS, strict=False):
+        assert 1.0e3 * got[0] == pytest.approx(begin, abs=1.0e-3)
+        assert got[1] == pytest.approx(speed, abs=1.0e-3)
+        assert 1.0e3 * got[2] == pytest.approx(end, abs=1.0e-3)
+        assert got[3] == pytest.approx(peak, rel=1.0e-3)
+
+
+# Full coordinates: their equations, the motion, and what it must do whatever the leg.
 
 
 # Equations of motion: structure against dense algebra, and what contact forces may and may not do.
 
-
-pytestmark = pytest.mark.slow  # kernels that only tests call are compiled for it
 
 CLEARANCE_JOINTS = ("A", "B", "G", "I", "J")
 APPROACH = np.full(len(CLEARANCE_JOINTS), 0.2)
@@ -97,6 +175,7 @@ def _forces(model, surfaces, k, q, v, cs):
     return f_n, f_t, delta_dot, slip
 
 
+@pytest.mark.slow  # kernels that only tests call are compiled for it
 @given(phase=phases, offset=offsets, velocity=velocities)
 def test_contact_is_action_and_reaction_moments_included(model, worn, cycle, phase, offset, velocity):
     """All forces, the ground's too, sum to nothing; so do their moments about the origin, hence any point."""
@@ -108,6 +187,7 @@ def test_contact_is_action_and_reaction_moments_included(model, worn, cycle, pha
     assert abs(moment.sum()) <= 1.0e-12 * size
 
 
+@pytest.mark.slow  # kernels that only tests call are compiled for it
 @given(phase=phases, offset=offsets, velocity=velocities)
 def test_contact_does_no_work_but_that_of_its_two_forces(model, worn, cycle, phase, offset, velocity):
     """Generalised forces times velocities = sum of - F_N delta_dot + F_T v_t."""
@@ -122,6 +202,7 @@ def test_contact_does_no_work_but_that_of_its_two_forces(model, worn, cycle, pha
     assert (force * v).sum() == pytest.approx(power, rel=1.0e-9, abs=1.0e-12 * np.abs(force).max())
 
 
+@pytest.mark.slow  # kernels that only tests call are compiled for it
 @given(phase=phases, offset=offsets, velocity=velocities)
 def test_accelerations_are_those_of_dense_algebra(model, worn, cycle, phase, offset, velocity):
     """[M, phi_q^T; phi_q, 0] [a; lambda] = [Q; gamma - 2 alpha phi' - alpha^2 phi], solved whole."""
@@ -152,190 +233,10 @@ def test_accelerations_are_those_of_dense_algebra(model, worn, cycle, phase, off
     np.testing.assert_array_equal(a[0], 0.0)
 
 
-# A controller that drives the crank: gains on the errors of angle and speed, feed-forward, a limit.
-
-
-SPEED = 5.0  # rad/s
-INERTIA = 0.02  # kg m^2
-
-
-def _tracked(document, name, **track):
-    """A mechanism that comes with the package under a controller."""
-    mechanism = document(name)
-    mechanism["drive"] = {"body": mechanism["drive"]["body"], "track": {"speed_radps": SPEED} | track}
-    return mechanism
-
-
-def _rotor(**track):
-    """A rotor on a fixed pin, which closed forms know."""
-    return parse_mechanism(
-        {
-            "name": "rotor",
-            "gravity": [0.0, 0.0],
-            "ground": {"points": {"A": [0.0, 0.0]}},
-            "bodies": {
-                "rotor": {"mass": 1.0, "inertia": INERTIA, "com": [0.0, 0.0], "points": {"A": [0.0, 0.0]}}
-            },
-            "joints": {"A": {"bushing": "ground", "journal": "rotor"}},
-            "drive": {"body": "rotor", "track": {"speed_radps": SPEED} | track},
-            "assembly": {"crank_angle": 0.0, "rotor": [0.0, 0.0, 0.0]},
-        },
-        "rotor",
-    )
-
-
-def _advance(mechanism, t_end, **options):
-    run = FullRun(prepare(mechanism, clearances=options.pop("clearances", ())), **options)
-    statistics, stored = new_run_statistics(len(mechanism.joints)), run.stored_energy
-    run.advance(t_end, statistics)
-    return run, statistics, stored
-
-
-@pytest.mark.parametrize("t_end", [0.1, 0.35, 0.8])
-def test_a_rotor_settles_as_the_closed_form_says(t_end):
-    """A step of feed-forward moves it to where the gain holds it, as a damped oscillator."""
-    kp, kd, step = 2.0, 0.06, 0.5
-    run, _, _ = _advance(
-        _rotor(kp_nm_per_rad=kp, kd_nm_s_per_rad=kd, feed_forward_nm=step), t_end, tolerance_m=1.0e-12
-    )
-    decay = kd / (2.0 * INERTIA)
-    wave = math.sqrt(kp / INERTIA - decay**2)
-    swing = math.exp(-decay * t_end)
-    error = step / kp * (1.0 - swing * (math.cos(wave * t_end) + decay / wave * math.sin(wave * t_end)))
-    rate = step / kp * swing * (wave + decay**2 / wave) * math.sin(wave * t_end)
-    assert run.q[1, 2] == pytest.approx(SPEED * t_end + error, rel=1.0e-9)
-    assert run.v[1, 2] == pytest.approx(SPEED + rate, rel=1.0e-9)
-
-
-@pytest.mark.parametrize("asked", [7.0, -7.0])
-def test_the_drive_gives_no_more_than_its_largest_torque(asked):
-    run, statistics, _ = _advance(_rotor(feed_forward_nm=asked, max_torque_nm=0.4), 0.5, tolerance_m=1.0e-12)
-    torque = math.copysign(0.4, asked)
-    assert run.v[1, 2] == pytest.approx(SPEED + torque / INERTIA * 0.5, rel=1.0e-9)
-    assert statistics.drive_integral[TORQUE] == pytest.approx(0.5 * torque, rel=1.0e-12)
-
-
-def test_the_feed_forward_follows_the_phase_of_the_wanted_motion():
-    """Linear between its phases, and from the last on to the first: over a turn its mean is the table's."""
-    table = {"feed_forward_nm": [1.0, -2.0, 0.5], "feed_forward_phase": [0.0, 0.25, 0.75]}
-    _, statistics, _ = _advance(_rotor(**table), TURN / SPEED, tolerance_m=1.0e-10)
-    mean = 0.25 * (1.0 - 2.0) / 2.0 + 0.5 * (-2.0 + 0.5) / 2.0 + 0.25 * (0.5 + 1.0) / 2.0
-    assert statistics.drive_integral[TORQUE] * SPEED / TURN == pytest.approx(mean, rel=1.0e-6)
-
-
-def test_without_gains_it_is_a_constant_torque(document):
-    constant = document("four_bar")
-    constant["drive"] = {"body": "crank", "torque": -0.3, "initial_speed": SPEED}
-    tracked = _tracked(document, "four_bar", feed_forward_nm=-0.3)
-    a, b = (_advance(parse_mechanism(one, "four_bar"), 0.6)[0] for one in (tracked, constant))
-    assert abs(a.q[1, 2] - 0.6 * SPEED) > 0.1  # it has left the motion to follow
-    np.testing.assert_allclose(a.state.y, b.state.y, rtol=0.0, atol=1.0e-9)
-
-
-def test_high_gains_tend_to_a_constant_speed(document):
-    """Ten times the gains, a tenth of the error; the torque tends to that of the ideal linkage."""
-    errors, torques = [], []
-    for gain in (1.0, 10.0, 100.0):
-        gains = {"kp_nm_per_rad": 30.0 * gain, "kd_nm_s_per_rad": 10.0 * gain}
-        mechanism = parse_mechanism(_tracked(document, "four_bar", **gains), "four_bar")
-        run, _, _ = _advance(mechanism, 1.0)
-        errors.append(abs(run.q[1, 2] - SPEED * 1.0))
-        torques.append(run.sample().drive_torque)
-    assert errors[1] == pytest.approx(0.1 * errors[0], rel=0.1)
-    assert errors[2] == pytest.approx(0.01 * errors[0], rel=0.1)
-    steady = document("four_bar")
-    steady["drive"] = {"body": "crank", "speed": SPEED}
-    wanted = _advance(parse_mechanism(steady, "four_bar"), 1.0)[0].sample().drive_torque
-    assert torques[2] == pytest.approx(wanted, rel=5.0e-3)
-
-
-def test_the_ideal_torque_as_feed_forward_leaves_little_to_the_gains(document):
-    steady = document("four_bar")
-    steady["drive"] = {"body": "crank", "speed": SPEED}
-    linkage = prepare(parse_mechanism(steady, "four_bar"), clearances=()).linkage
-    table = {
-        "feed_forward_nm": one_cycle(linkage, 128, SPEED).drive_torque.tolist(),
-        "feed_forward_phase": (np.arange(128) / 128).tolist(),
-    }
-    gains = {"kp_nm_per_rad": 2.0, "kd_nm_s_per_rad": 0.1}
-    bare, fed = (
-        _advance(parse_mechanism(_tracked(document, "four_bar", **gains, **more), "four_bar"), 1.0)[0]
-        for more in ({}, table)
-    )
-    assert abs(fed.q[1, 2] - SPEED) < 1.0e-3 * abs(bare.q[1, 2] - SPEED)
-
-
-@pytest.mark.parametrize("clearances", [(), ("B",)])
-def test_the_work_of_the_drive_is_in_the_energy(document, clearances):
-    """With a limit that is reached, so that the torque is not that of a spring and a damper."""
-    four_bar = _tracked(
-        document, "four_bar", kp_nm_per_rad=8.0, kd_nm_s_per_rad=1.0, feed_forward_nm=0.1, max_torque_nm=0.2
-    )
-    run, statistics, stored = _advance(
-        parse_mechanism(four_bar, "four_bar"), 0.5, clearances=clearances, tolerance_m=1.0e-11
-    )
-    lost = statistics.integral[:, [FRICTION, DISSIPATION]].sum()
-    assert statistics.drive_range[1] == 0.2
-    assert statistics.drive_integral[POWER] == pytest.approx(
-        run.stored_energy - stored + lost, rel=1.0e-8 if not clearances else 1.0e-4
-    )
-
-
-def test_simulate_counts_the_turns_it_made(document):
-    """At a slow pace and with a stiff controller these are those asked for, but for the little it lags."""
-    mechanism = parse_mechanism(
-        _tracked(document, "four_bar", kp_nm_per_rad=300.0, kd_nm_s_per_rad=30.0), "four_bar"
-    )
-    result = simulate(mechanism, clearances=(), cycles=2.0, trace=8)
-    assert result.model == "full"
-    assert result.cycles == pytest.approx(2.0, abs=1.0e-3)
-    assert result.speed_rpm == pytest.approx(60.0 * SPEED / TURN, rel=1.0e-3)
-    assert abs(result.energy_j.residual) < 1.0e-6
-    assert len(result.trace.crank_angle_rad) == 16
-    faster = simulate(mechanism, clearances=(), cycles=1.0, speed_rpm=90.0)
-    assert faster.speed_rpm == pytest.approx(90.0, rel=1.0e-3)
-
-
-def test_the_clearance_model_says_what_it_needs(document):
-    mechanism = parse_mechanism(_tracked(document, "four_bar", kp_nm_per_rad=1.0), "my_leg.yaml")
-    message = r"^my_leg.yaml: drive.track: the clearance model needs drive.speed; try --model full$"
-    with pytest.raises(ConfigError, match=message):
-        simulate(mechanism, model="clearance")
-
-
-@pytest.mark.parametrize(
-    ("track", "fault"),
-    [
-        ({"speed_radps": 0.0}, r"drive.track.speed_radps: 0.0 rad/s does not turn the crank"),
-        ({"kp_nm_per_rad": -1.0}, r"drive.track.kp_nm_per_rad: -1.0 is not at least 0 N m/rad"),
-        ({"max_torque_nm": 0.0}, r"drive.track.max_torque_nm: 0.0 is not above 0 N m"),
-        ({"kp": 1.0}, r"drive.track.kp: unknown key"),
-        ({"feed_forward_nm": "much"}, r"drive.track.feed_forward_nm: 'much' is not a number"),
-        (
-            {"feed_forward_nm": [1.0, 2.0]},
-            r"drive.track.feed_forward_nm: has 2 torques for 1 phases. Expected one each",
-        ),
-        (
-            {"feed_forward_nm": [1.0, 2.0], "feed_forward_phase": [0.5, 0.5]},
-            r"drive.track.feed_forward_phase: \[0.5, 0.5\] does not increase",
-        ),
-    ],
-)
-def test_a_controller_that_cannot_be_is_refused(track, fault):
-    with pytest.raises(ConfigError, match=fault):
-        _rotor(**track)
-
-
-def test_one_kind_of_drive_at_a_time(document):
-    four_bar = _tracked(document, "four_bar")
-    four_bar["drive"]["torque"] = 1.0
-    with pytest.raises(ConfigError, match=r"drive: has torque and track. Expected one of speed .*, track"):
-        parse_mechanism(four_bar, "four_bar")
-
-
 # Small clearances, drift: what the motion must do whatever the leg.
 
 
+@pytest.mark.slow
 @pytest.mark.chaotic
 def test_a_vanishing_clearance_is_an_ideal_joint(leg_cycles, leg, linkage_of):
     """Mean forces fall towards the ideal ones as all clearances shrink, and come within 5 %, J's 20 %.
@@ -373,6 +274,7 @@ def _drift(leg, clearance_joints, seconds, baumgarte, tolerance_m=TOLERANCE_M):
     return drift
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clearance_joints", ["", "ABGIJ"])
 def test_closures_stay_closed(leg, clearance_joints):
     """Below 1e-8 m and 1e-6 m/s over several cycles, without a trend."""
@@ -381,6 +283,7 @@ def test_closures_stay_closed(leg, clearance_joints):
     assert drift[-1, 0] < 3.0 * drift[0, 0]
 
 
+@pytest.mark.slow
 def test_closures_drift_apart_without_baumgarte(leg):
     """At ten times the default's step error, so that four seconds show it."""
     drift = _drift(leg, tuple("ABGIJ"), 4, 0.0, 10.0 * TOLERANCE_M)[:, 0]

@@ -1,4 +1,4 @@
-"""Reading recordings: MCAP and SQLite, whole and damaged, within memory."""
+"""Recordings: bags, tables and arrays as samples; one recording of one leg."""
 
 import os
 import shutil
@@ -6,6 +6,7 @@ import sqlite3
 import struct
 from collections.abc import Callable
 from contextlib import closing
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,18 @@ import pytest
 import zstandard
 from made_recordings import losses
 
-from leg_wear_monitor.monitor.config.inputs import DriveTorque
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, DriveTorque
+from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import encode, findings
-from leg_wear_monitor.recordings.findings import RecordingError
+from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.recordings.mcap_file import McapWriter
 from leg_wear_monitor.twin import TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
+
+# Reading recordings: MCAP and SQLite, whole and damaged, within memory.
+
 
 # However messages were stored, the same samples come out, in order of log time.
 
@@ -355,3 +362,292 @@ def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path, read, name):
     with pytest.raises(RecordingError, match=r"cannot be read: |does not exist") as caught:
         read(tmp_path / name)
     assert str(caught.value).isprintable()
+
+
+# Several files are one recording of one leg, or are refused; names in them obey nobody.
+
+
+START_NS, RATE_HZ = 1_700_000_000 * 10**9, 200
+
+
+def write(path, *, begin=0, end=400, topic="/joint_states", names=("hip", "crank")):
+    """Part of a crank's motion, of which each sample is the same in any file that has it."""
+    k = np.arange(begin, end, dtype=np.int64)
+    stamps = START_NS + k * (10**9 // RATE_HZ)
+    angle = 2.0 * np.pi * k / RATE_HZ
+    rows = encode.joint_states(stamps, list(names), position=np.stack([0.0 * angle, angle], axis=1))
+    with McapWriter(path, chunk_bytes=8000) as writer:
+        channel = writer.channel(topic, encode.JOINT_STATE)
+        for i in range(0, len(k), 40):
+            writer.write_many(channel, stamps[i : i + 40], rows[i : i + 40])
+            writer.flush()
+    return path
+
+
+def test_another_namespace_is_another_leg_unless_one_is_named(tmp_path, read):
+    left = write(tmp_path / "left.mcap")
+    right = write(tmp_path / "right.mcap", topic="/right/joint_states")
+    with pytest.raises(RecordingError, match=r"right\.mcap: joint_states: has /right/joint_states, where"):
+        read(left, right)
+    samples, recording = read(left, right, joint_states="/right/joint_states")
+    assert len(samples) == 400
+    assert any("has no topic /right/joint_states" in finding.text for finding in recording.findings)
+
+
+def test_a_part_of_a_split_bag_may_have_no_crank(tmp_path, read):
+    """Its first message may be of another publisher, and the recording end there."""
+    write(tmp_path / "walk_0.mcap")
+    write(tmp_path / "walk_1.mcap", begin=400, end=401, names=("hip", "knee"))
+    samples, recording = read(tmp_path)
+    assert np.count_nonzero(samples["fault"] == 0) == 400
+    assert any("joint crank is not among the joints of 1 messages" in one.text for one in recording.findings)
+
+
+def test_parts_and_overlaps_of_one_leg_are_one(tmp_path, read):
+    parts = [
+        write(tmp_path / f"{begin}_{end}.mcap", begin=begin, end=end)
+        for begin, end in ((0, 200), (150, 300), (300, 400), (0, 400))
+    ]
+    samples, recording = read(*parts)
+    assert len(samples) == 850
+    assert len(np.unique(samples["stamp_ns"])) == 400
+    assert not recording.is_partial
+
+
+def test_messages_without_the_crank_among_others_are_a_finding(tmp_path, read):
+    """As where two drivers publish their joints on one topic."""
+    arm = write(tmp_path / "arm.mcap", names=("elbow", "wrist\x1b[2J"))
+    both = tmp_path / "both.mcap"
+    with pytest.raises(
+        RecordingError, match=r"of 400 messages; they have elbow, wrist\\x1b\[2J; set the crank"
+    ):
+        read(arm)
+    stamps = START_NS + np.arange(400, dtype=np.int64) * 5_000_000
+    with McapWriter(both) as writer:
+        channel = writer.channel("/joint_states", encode.JOINT_STATE)
+        for names in (["elbow"], ["crank"]):
+            writer.write_many(
+                channel, stamps, encode.joint_states(stamps, names, position=np.zeros((400, 1)))
+            )
+    samples, recording = read(both)
+    assert len(samples) == 800
+    texts = [finding.text for finding in recording.findings if "crank" in finding.text]
+    assert texts == [
+        "joint crank is not among the joints of 400 messages; they have elbow; 400 messages have it"
+    ]
+    assert not recording.is_partial
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("/joint_states", "/joint_states"),
+        ("Größe μ", "Größe μ"),
+        ("\x1b[2J", "\\x1b[2J"),
+        ("a\nb\r\x9b", "a\\nb\\r\\x9b"),
+        ("\u202e", "\\u202e"),
+        ("\udcff", "\\udcff"),
+        ("x" * 3000, "x" * 2000 + " and 1000 characters more"),
+    ],
+)
+def test_what_is_shown_can_be_shown(text, shown):
+    assert printable(text) == shown
+    assert printable(text).isprintable()
+    assert str(RecordingError(text, text, text)) == f"{shown}: {shown}: {shown}"
+    assert str(Finding(Path("x"), text, Severity.NOTE)) == f"x: {shown}"
+
+
+def test_names_in_a_file_obey_nobody(tmp_path, read):
+    path = write(tmp_path / "x.mcap", topic="/\x1b]0;owned\x07/states")
+    with pytest.raises(RecordingError) as caught:
+        read(path)
+    assert str(caught.value).isprintable()
+    assert "\\x1b]0;owned\\x07" in str(caught.value)
+
+
+# The same values as CSV, as Parquet, as arrays and as MCAP give the same samples, bit for bit.
+
+
+ReadRecording = Callable[..., Any]
+NS = {"table.units.stamp": "ns", "table.columns.crank_speed": "crank_speed"}
+NAMES = ("time", "crank_angle", "crank_speed", "drive_torque")
+FIELDS = ("stamp_ns", "crank_angle_rad", "crank_velocity_radps", "torque_nm")
+
+
+@pytest.fixture(scope="module")
+def bag_messages(traffic):
+    return traffic()
+
+
+def columns_of(samples):
+    """A row a sample, with NaN where it has no value."""
+    return {name: samples[field].copy() for name, field in zip(NAMES, FIELDS, strict=True)}
+
+
+def cell(value):
+    if isinstance(value, int):
+        return str(value)
+    return "" if np.isnan(value) else repr(value)
+
+
+def write_csv(path, columns, separator=","):
+    rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+    lines = [separator.join(columns), *(separator.join(map(cell, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_csv_file_gives_the_samples_of_the_bag(tmp_path, bag_messages, write_bag, read, separator):
+    """Their stamps go back now and then, as torques are late: the order of the rows is that of arrival."""
+    samples, _ = read(write_bag(tmp_path / "a.mcap", bag_messages))
+    columns = columns_of(samples)
+    if separator == " ":  # in which an empty cell cannot be written
+        columns = {name: np.nan_to_num(column) for name, column in columns.items()}
+        samples = read(columns, config=config_from(NS))[0]
+    found, _ = read(write_csv(tmp_path / "a.csv", columns, separator), config=config_from(NS))
+    assert found.tobytes() == samples.tobytes()
+
+
+def test_arrays_frames_and_parquet_give_the_samples_of_the_bag(tmp_path, bag_messages, expected, read):
+    columns = columns_of(expected(bag_messages))
+    assert read(columns, config=config_from(NS))[0].tobytes() == expected(bag_messages).tobytes()
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(columns)
+    assert read(frame, config=config_from(NS))[0].tobytes() == expected(bag_messages).tobytes()
+    assert (
+        read(frame.set_index("time"), config=config_from(NS))[0].tobytes() == expected(bag_messages).tobytes()
+    )
+    pytest.importorskip("pyarrow")
+    frame.to_parquet(tmp_path / "a.parquet")
+    assert (
+        read(tmp_path / "a.parquet", config=config_from(NS))[0].tobytes() == expected(bag_messages).tobytes()
+    )
+
+
+def test_dates_are_stamps_to_the_nanosecond(tmp_path, bag_messages, expected, read):
+    config = config_from(NS | {"table.units.stamp": "date"})
+    columns = columns_of(expected(bag_messages))
+    dates = columns["time"].view("datetime64[ns]")
+    assert read(columns | {"time": dates}, config=config)[0].tobytes() == expected(bag_messages).tobytes()
+    for mark in ("", "Z", "+00:00"):
+        lines = write_csv(tmp_path / "a.csv", columns).read_text().splitlines()
+        cells = [f"{str(date).replace('T', ' ')}{mark}" for date in dates]
+        dated = [f"{date},{line.partition(',')[2]}" for date, line in zip(cells, lines[1:], strict=True)]
+        (tmp_path / "a.csv").write_text("\n".join([lines[0], *dated]) + "\n")
+        assert read(tmp_path / "a.csv", config=config)[0].tobytes() == expected(bag_messages).tobytes()
+
+
+@pytest.mark.parametrize(("unit", "power"), [("s", 9), ("ms", 6), ("us", 3), ("ns", 0)])
+@pytest.mark.parametrize("start_ns", [0, 1_700_000_000 * 10**9])
+def test_times_in_any_unit_are_exact_to_a_microsecond(tmp_path, read, unit, power, start_ns):
+    stamps = start_ns + np.random.default_rng(power).integers(1, 10**13, 300)
+    lines = [f"{Decimal(int(stamp)).scaleb(-power)},0.5" for stamp in stamps]
+    (tmp_path / "a.csv").write_text("\n".join(["time,crank_angle", *lines]) + "\n")
+    config = config_from({"table.units.stamp": unit, "table.columns.drive_torque": ""})
+    found = read(tmp_path / "a.csv", config=config)[0]["stamp_ns"]
+    assert np.abs(found - stamps).max() < 1000
+    assert unit != "ns" or np.array_equal(found, stamps)
+
+
+@pytest.mark.parametrize("source", TORQUE_SOURCES)
+def test_a_torque_comes_as_the_parameters_say(read, source):
+    config = config_from({"drive_torque.source": source, "drive_torque.axis": "x", "drive_torque.sign": -1})
+    columns = {
+        "time": np.arange(1.0, 4.0),
+        "crank_angle": np.arange(3.0),
+        "drive_torque": np.arange(5.0, 8.0),
+    }
+    samples, _ = read(columns, config=config)
+    assert len(samples) == (3 if source == "effort" else 6)
+    torques = samples[np.isfinite(samples["torque_nm"])]
+    assert torques["torque_nm"].tolist() == [-5.0, -6.0, -7.0]
+    assert torques["stamp_ns"].tolist() == [10**9, 2 * 10**9, 3 * 10**9]
+
+
+def test_units_become_si(read):
+    config = config_from(
+        {
+            "table.units.stamp": "ms",
+            "table.units.crank_angle": "deg",
+            "table.units.crank_speed": "rpm",
+            "table.units.drive_torque": "N mm",
+            "table.columns.crank_speed": "speed",
+            "table.start": "2026-03-01T00:00:00Z",
+        }
+    )
+    columns = {"time": [0, 1], "crank_angle": [90, 180], "speed": [60, 30], "drive_torque": [12345, 0.1]}
+    samples, _ = read(columns, config=config)
+    assert samples["crank_angle_rad"][::2].tolist() == [np.pi / 2.0, np.pi]
+    assert samples["crank_velocity_radps"][::2].tolist() == pytest.approx([2.0 * np.pi, np.pi], rel=1e-15)
+    assert samples["torque_nm"][1::2].tolist() == [12.345, 0.0001]
+    first_ns = int(np.datetime64("2026-03-01", "ns").astype(np.int64))
+    assert samples["stamp_ns"].tolist() == [first_ns, first_ns, first_ns + 10**6, first_ns + 10**6]
+
+
+def test_further_encoders_are_columns_by_their_names(read):
+    config = config_from(
+        {"encoders.names": ["knee", "hip"], "encoders.joints": ["C", "B"], "encoders.signs": [1.0, -1.0]}
+    )
+    columns = {
+        "time": [1.0, 2.0, 3.0],
+        "crank_angle": [0.1, 0.2, 0.3],
+        "drive_torque": [np.nan] * 3,
+        "knee": [1.0, np.nan, 3.0],
+        "hip": [4.0, 5.0, np.nan],
+    }
+    samples, _ = read(columns, config=config)
+    assert samples["crank_angle_rad"].tolist() == [0.1, 0.2, 0.3]
+    assert np.array_equal(
+        samples["encoder_rad"][:, :2], [[1.0, -4.0], [np.nan, -5.0], [3.0, np.nan]], equal_nan=True
+    )
+
+
+def test_rows_without_a_time_come_at_their_rate(tmp_path, read):
+    config = config_from(
+        {
+            "table.columns.drive_torque": "",
+            "table.columns.crank_angle": "2",
+            "table.rate_hz": 400.0,
+            "table.start": "1970-01-01T00:00:01",
+        }
+    )
+    (tmp_path / "a.csv").write_text("7,0.1\n7,x\n7,0.3\n")  # and no names: columns have numbers
+    samples, recording = read(tmp_path / "a.csv", config=config)
+    assert samples["stamp_ns"].tolist() == [10**9, 10**9 + 5 * 10**6]
+    assert [finding.text for finding in recording.findings] == [
+        "drive_torque: is not a topic of the recording; it has /joint_states",
+        "line 2 is lost: column '2': 'x' is not a number. Expected a value in rad",
+    ]
+
+
+def test_several_files_and_a_bag_are_one_recording(tmp_path, traffic, write_bag, expected, read):
+    first, second = traffic(), traffic(start_ns=1_700_000_003 * 10**9)
+    bag = write_bag(tmp_path / "a.mcap", second)
+    table = write_csv(tmp_path / "b.csv", columns_of(expected(first)))
+    samples, recording = read(bag, table, config=config_from(NS))
+    assert samples.tobytes() == np.concatenate([expected(first), expected(second)]).tobytes()
+    assert any("begins" in finding.text for finding in recording.findings)
+
+
+def test_a_file_larger_than_a_block_is_read_whole(tmp_path, read):
+    stamps = 1 + np.arange(60_000)
+    columns = {"time": stamps, "crank_angle": np.random.default_rng(0).normal(size=len(stamps))}
+    config = config_from({"table.units.stamp": "ms", "table.columns.drive_torque": ""})
+    path = write_csv(tmp_path / "a.csv", columns)
+    samples, _ = read(path, config=config)
+    assert np.array_equal(samples["crank_angle_rad"], columns["crank_angle"])
+    assert np.array_equal(samples["stamp_ns"], stamps * 10**6)
+
+
+def test_a_number_that_is_none_is_a_faulty_sample_and_an_empty_cell_is_no_sample(tmp_path, read):
+    (tmp_path / "a.csv").write_text("time,crank_angle,drive_torque\n1.1,nan,\n1.2,0.5,nan\n1.3,,4\n")
+    samples, _ = read(tmp_path / "a.csv", config=config_from({}))
+    assert samples["stamp_ns"].tolist() == [1_100_000_000, 1_200_000_000, 1_200_000_000, 1_300_000_000]
+    assert (samples["fault"] != 0).tolist() == [True, False, True, False]
+
+
+def test_a_message_of_a_number_is_that_of_the_library(store):
+    kind = store.types["std_msgs/msg/Float64"]
+    raw = encode.float64s([1.5, -2.0])
+    assert bytes(raw[1]) == bytes(store.serialize_cdr(kind(-2.0), "std_msgs/msg/Float64"))

@@ -167,7 +167,7 @@ def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: 
     assert closed_runs(ledger) == [(1,)]
 
 
-@pytest.mark.slow  # CI runs `make demo`; ros/test_live.py and test_people.py hold its parts in one process
+@pytest.mark.slow  # CI runs `make demo`; test_live.py and test_node.py hold its parts in one process
 @pytest.mark.usefixtures("traps")
 def test_the_demo_tells_its_story(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]

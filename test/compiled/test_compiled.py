@@ -1,4 +1,4 @@
-"""Kernels: compilation, cache, records."""
+"""Kernels, vectors of joints, and the cache of compiled code."""
 
 import ast
 import math
@@ -7,23 +7,51 @@ import platform
 import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import command_line
 import numba
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
 import leg_wear_monitor
+from leg_wear_monitor.cli import kernels
+from leg_wear_monitor.compiled import kernel as kernels_of
 from leg_wear_monitor.compiled import kernel as whole_program
-from leg_wear_monitor.compiled.kernel import (
-    ByAddress,
-    cache_directory,
-    entry,
-    kernel,
-    new_records,
-    record_of,
+from leg_wear_monitor.compiled import vector_kinds
+from leg_wear_monitor.compiled.cache import code_directory, make_private
+from leg_wear_monitor.compiled.kernel import ByAddress, cache_directory, entry, kernel, new_records, record_of
+from leg_wear_monitor.compiled.kernel import kernel as compiled_kernel
+from leg_wear_monitor.compiled.vectors import (
+    WIDTH,
+    any_of,
+    bits_of,
+    entry_of,
+    evens,
+    every,
+    largest,
+    number_of,
+    odds,
+    only,
+    padded,
+    part_at,
+    put_part,
+    put_vector,
+    root,
+    vector_at,
+    vector_max,
+    vector_sum,
+    where,
+    with_entry,
+    zip_first,
+    zip_last,
 )
+from leg_wear_monitor.errors import ConfigWarning
+
+# Kernels: compilation, cache, records.
+
 
 # The cache of compiled code: it works wherever the package lies, and is never stale.
 
@@ -367,3 +395,250 @@ def test_a_name_that_numpy_has_taken_is_refused(dtype):
     """Plain Python would read numpy's method, or its number of elements, in place of the field."""
     with pytest.raises(ValueError, match=r"^fields (mean|fill): "):
         new_records(1, np.dtype(dtype))
+
+
+# Vectors in compiled code, and without a compiler: the same numbers.
+
+
+@entry
+def along(scale, a, b, out):
+    """Out = b + scale a - a b in both rows; returns the sum and the maximum of the products in row 1."""
+    total, most = every(0.0), every(-math.inf)
+    for i in range(0, a.shape[1], WIDTH):
+        product = part_at(a, (1, i)) * part_at(b, (1, i))
+        total += product
+        most = largest(most, product)
+    for row in range(2):
+        for i in range(0, a.shape[1], WIDTH):
+            value = part_at(b, (row, i)) + scale * part_at(a, (row, i))
+            value -= part_at(a, (row, i)) * part_at(b, (row, i))
+            put_part(out, (row, i), value)
+    return vector_sum(total), vector_max(most)
+
+
+@pytest.mark.parametrize("width", [2, 8, 10, 20])
+def test_vectors_are_the_numbers_one_by_one(width):
+    random = np.random.default_rng(1)
+    a, b, out = random.normal(size=(3, 2, width))
+    total, most = along(0.3, a, b, out)
+    np.testing.assert_array_equal(out, (b + 0.3 * a) - a * b)
+    assert total == pytest.approx(a[1] @ b[1], rel=1.0e-12)
+    largest_of_row = (a[1] * b[1]).max()
+    assert most == (max(0.0, largest_of_row) if width % WIDTH else largest_of_row)
+
+
+def test_a_row_that_starts_at_any_number_and_a_store_that_stays_inside():
+    """Tables are views into one array: a vector need not start at a multiple of its own length."""
+    flat = np.arange(23.0)
+    a, whole = flat[1:23].reshape(2, 11), np.zeros((3, 11))
+    along(2.0, a, np.ones((2, 11)), whole[:2])
+    np.testing.assert_array_equal(whole[:2], 1.0 + 2.0 * a - a)
+    assert not whole[2].any()
+
+
+@entry
+def shuffled(x, out):
+    a, b = vector_at(x, 0), vector_at(x, WIDTH)
+    put_vector(out, (0, 0), evens(a, b))
+    put_vector(out, (1, 0), odds(a, b))
+    put_vector(x, 0, zip_first(evens(a, b), odds(a, b)))
+    put_vector(x, WIDTH, zip_last(evens(a, b), odds(a, b)))
+    put_vector(out, (2, 0), with_entry(a, 3, 7.5))
+    put_vector(out, (3, 0), only(entry_of(b, 2), 5))
+    return any_of(a > 6.5), any_of(a > 7.5)
+
+
+def test_entries():
+    x, out = np.arange(16.0), np.zeros((4, WIDTH))
+    assert shuffled(x, out) == (True, False)
+    np.testing.assert_array_equal(x, np.arange(16.0))
+    np.testing.assert_array_equal(out[0], x[::2])
+    np.testing.assert_array_equal(out[1], x[1::2])
+    np.testing.assert_array_equal(out[2], [0, 1, 2, 7.5, 4, 5, 6, 7])
+    np.testing.assert_array_equal(out[3], [0, 0, 0, 0, 0, 10, 0, 0])
+
+
+@compiled_kernel
+def formula(a, b):
+    """Of numbers or of vectors."""
+    return where((a > b) & (b >= -0.5), -root(abs(a)), 2.0 - largest(a, 0.25) / (1.0 + b * b))
+
+
+@entry
+def formulas(a, b, out_vector, out_number):
+    put_vector(out_vector, 0, formula(vector_at(a, 0), vector_at(b, 0)))
+    for i in range(a.shape[0]):
+        out_number[i] = formula(a[i], b[i])
+
+
+def test_one_formula_for_numbers_and_vectors():
+    random = np.random.default_rng(2)
+    a, b, found, expected = random.normal(size=(4, WIDTH))
+    formulas(a, b, found, expected)
+    np.testing.assert_array_equal(found, expected)
+    plain = np.where((a > b) & (b >= -0.5), -np.sqrt(abs(a)), 2.0 - np.maximum(a, 0.25) / (1.0 + b * b))
+    np.testing.assert_array_equal(found, plain)
+
+
+@entry
+def widened(x, out):
+    put_vector(out, 0, part_at(x, (1, 1, 2)))
+
+
+def test_single_precision_rows_of_three_dimensions():
+    x, out = np.arange(24.0, dtype=np.float32).reshape(2, 3, 4), np.full(WIDTH, 9.0)
+    widened(x, out)
+    np.testing.assert_array_equal(out, [18.0, 19.0, 0, 0, 0, 0, 0, 0])
+
+
+@entry
+def there_and_back(number):
+    whole = bits_of(number)
+    return whole, number_of(whole)
+
+
+@pytest.mark.parametrize("number", [0.0, 1.0, -2.5, 1.0e-300, math.pi, math.inf])
+def test_bits(number):
+    assert there_and_back(number) == (int(np.float64(number).view(np.int64)), number)
+
+
+@pytest.mark.parametrize(("count", "room"), [(0, 0), (1, 8), (8, 8), (9, 16)])
+def test_padded(count, room):
+    assert padded(count) == room
+
+
+def test_without_a_compiler():
+    x = np.arange(8.0).reshape(2, 4)
+    vector_kinds.stored(x, (0, 2), vector_kinds.loaded(x, (1, 0)) + 2.0 * vector_kinds.loaded(x, (1, 2)))
+    np.testing.assert_array_equal(x[0], [0.0, 1.0, 16.0, 19.0])
+    assert vector_kinds.folded(vector_kinds.loaded(x, (0, 2)), np.add) == 35.0
+    assert vector_kinds.chosen(True, 1.0, 2.0) == 1.0
+    assert vector_kinds.root_of(4.0) == 2.0
+
+
+# Compiled code lies where no other local user can put or replace a file: its index files are pickles.
+
+
+NOBODY = 65534
+WHERE = "from leg_wear_monitor.compiled.kernel import cache_directory; print(cache_directory())"
+
+as_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to be two users")
+
+
+def place_of(**environment):
+    """Where a fresh process puts its compiled code, and what it says on stderr."""
+    unset = ("NUMBA_", "XDG_", "COV_", "TMPDIR")
+    kept = {key: value for key, value in os.environ.items() if not key.startswith(unset)} | environment
+    command = [sys.executable, "-W", "default", "-c", WHERE]
+    done = subprocess.run(command, env=kept, text=True, capture_output=True, check=True)
+    return done.stdout.strip(), done.stderr
+
+
+def test_a_directory_is_private_whatever_the_umask(tmp_path):
+    before = os.umask(0)
+    try:
+        assert make_private(tmp_path / "a" / "b") is None
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a" / "b").stat().st_mode & 0o7777 == 0o700
+
+
+@pytest.mark.parametrize("bits", [0o777, 0o775, 0o757, 0o1777])
+def test_a_directory_that_others_can_write_to_is_refused(tmp_path, bits):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a").chmod(bits)
+    (tmp_path / "link").symlink_to("a")
+    for path in (tmp_path / "a", tmp_path / "link"):
+        assert make_private(path) == f"{path} can be written to by others (chmod go-w {path})"
+    assert (tmp_path / "a").stat().st_mode & 0o7777 == bits
+
+
+def test_a_file_in_the_way_is_reported(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "Not a directory" in make_private(tmp_path / "file" / "a")
+
+
+@as_root
+def test_a_directory_or_a_link_of_another_user_is_refused(tmp_path):
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "link").symlink_to("/root")
+    for path in (tmp_path / "theirs", tmp_path / "link"):
+        os.chown(path, NOBODY, NOBODY, follow_symlinks=False)
+        assert make_private(path) == f"{path} belongs to a different user (uid {NOBODY})"
+
+
+@as_root
+def test_a_directory_laid_in_advance_by_another_user_is_not_used(tmp_path):
+    """The way in: a service without a home, and a name below /tmp that anybody can foretell."""
+    laid = tmp_path / f"leg_wear_monitor-{os.geteuid()}"
+    laid.mkdir()
+    os.chown(laid, NOBODY, NOBODY)
+    place, output = place_of(TMPDIR=str(tmp_path), HOME="/dev/null")
+    assert place == "None"
+    assert not any(laid.iterdir())
+    assert f"{laid} belongs to a different user (uid {NOBODY})" in output
+    assert "compiled code is not stored" in output
+
+
+def test_a_directory_that_was_asked_for_and_is_refused_is_reported(tmp_path):
+    (tmp_path / "asked" / "leg_wear_monitor").mkdir(parents=True)
+    (tmp_path / "asked" / "leg_wear_monitor").chmod(0o777)
+    place, output = place_of(NUMBA_CACHE_DIR=str(tmp_path / "asked"), HOME=str(tmp_path / "home"))
+    assert Path(place).parent == tmp_path / "home" / ".cache" / "leg_wear_monitor"
+    assert output.count("ConfigWarning") == 1
+    assert "NUMBA_CACHE_DIR: " in output
+    assert "can be written to by others (chmod go-w" in output
+
+
+def test_the_usual_place_is_taken_without_a_word(place):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConfigWarning)
+        assert code_directory("a leaf of this test") == place / "a leaf of this test"
+
+
+# --- the verb `cache` ---
+
+
+def test_it_prints_where_and_how_much(place):
+    old = place / "dynamics.full.model-0123456789abcdef"
+    old.mkdir(parents=True, mode=0o700)
+    (old / "code").write_bytes(bytes(2_300_000))
+    lines = command_line.run("cache").out.splitlines()
+    assert lines == [f"place: {place}", "total: 2.3 MB in 2 directories"]  # one is the verb's own
+
+
+def test_clear_removes_all_of_it_and_nothing_beside(place):
+    for name in ("dynamics.full.model-0123456789abcdef", "0123456789abcdef"):
+        (place / name / "deep").mkdir(parents=True)
+        (place / name / "deep" / "code").write_bytes(bytes(1_000_000))
+    (place.parent / "beside").write_text("")
+    (place / "link").symlink_to(place.parent)
+    result = command_line.run("cache", "--clear")
+    assert result.code == 0
+    assert result.out.splitlines()[1] == "removed: 2.0 MB in 3 directories"
+    assert [each.name for each in place.iterdir()] == ["link"]
+    assert (place.parent / "beside").exists()
+
+
+def test_nothing_is_removed_where_no_place_is_safe(monkeypatch):
+    monkeypatch.setattr(kernels_of, "cache_directory", lambda: None)
+    result = command_line.run("cache", "--clear")
+    assert result.code == 2
+    assert result.err == "error: no directory is safe for compiled code, so it is not stored\n"
+
+
+def test_a_fill_prints_the_place_and_the_size(place, monkeypatch):
+    monkeypatch.setattr(kernels, "_CALLS", {"nothing": int})
+    result = command_line.run("cache", "--fill")
+    assert result.code == 0
+    assert result.out.startswith(f"place: {place}\ntotal: ")
+    assert command_line.run("cache", "--fill", "--clear").code == 2
+
+
+@pytest.mark.slow
+def test_after_a_fill_nothing_is_compiled(place):
+    assert command_line.run("cache", "--fill").code == 0
+    line = "import leg_wear_monitor.cli.kernels as kernels; [call() for call in kernels._CALLS.values()]"
+    before = sorted(file for file in place.rglob("*.nbc"))
+    subprocess.run([sys.executable, "-c", line], check=True, cwd=Path(__file__).parents[1])
+    assert before and sorted(file for file in place.rglob("*.nbc")) == before

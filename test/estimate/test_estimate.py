@@ -1,5 +1,6 @@
-"""Signatures of clearances in the drive torque, and the fits behind them."""
+"""Estimates by the drive torque: signatures and fits, the drive's channel, changes of clearances."""
 
+import math
 from collections.abc import Callable
 
 import attrs
@@ -7,11 +8,24 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import signal
 
-from leg_wear_monitor.estimate.drive import Channel
+from leg_wear_monitor.estimate.channel import channel_of
+from leg_wear_monitor.estimate.clearance_fit import FACTORS, ChangeDetector, excess, fit_clearances, threshold
+from leg_wear_monitor.estimate.drive import DIRECT, Channel, DriveFigures
+from leg_wear_monitor.estimate.explanations import Baseline, Explainer
 from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
+from leg_wear_monitor.estimate.leg_model import (
+    commissioned_baseline,
+    nuisances,
+    parts_left_out,
+    with_scatter_of,
+)
 from leg_wear_monitor.estimate.signature import (
+    Changes,
+    CommissionedTorque,
     PhaseMeans,
+    SignatureModel,
     SimulatedSensor,
     TorqueSensor,
     averaged,
@@ -24,8 +38,13 @@ from leg_wear_monitor.estimate.signature import (
 from leg_wear_monitor.estimate.torque_model import body_torques, torque_coefficients
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, one_cycle
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
+from leg_wear_monitor.twin.load import torque_size
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.references import TorqueReference
+
+# Signatures of clearances in the drive torque, and the fits behind them.
+
 
 # Signatures of gait cycles: laws that hold for any torque.
 
@@ -306,3 +325,278 @@ def test_leaving_out_parts_gives_the_scatter_of_a_mean() -> None:
     values = np.random.default_rng(7).standard_normal(600)
     (sigma,) = jackknife(lambda some: np.array([values[some].mean()]), len(values), 600)
     assert sigma == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)), rel=1e-6)
+
+
+# The channel of a drive from a mean signature: found in the air, half observable on the ground, declared.
+
+
+HZ = 35.0
+DRIVE = Channel(delay_s=0.0075, time_constant_s=1.0 / (TURN * HZ), load_friction=0.2)
+
+
+@pytest.fixture(scope="module")
+def known(leg):
+    reference = shipped_references(leg)[0]
+    sensor = TorqueSensor(0.005, 1.0, torque_size(build_linkage(leg), TURN), noise_nm=0.5)
+    return reference, sensor, nuisances(leg, reference, sensor)
+
+
+def behind(known, channel: Channel) -> np.ndarray:
+    """Mean signature of the leg as expected behind a drive, in gait cycles that the search does not use."""
+    reference, sensor, _ = known
+    return simulated_signatures(reference, 0, attrs.evolve(sensor, channel=channel))[20:].mean(axis=0)
+
+
+def test_lag_low_pass_and_load_friction_are_found_in_the_air(known):
+    reference, sensor, columns = known
+    found = channel_of(reference, sensor, behind(known, DRIVE), columns)
+    assert found.channel.lateness_s == pytest.approx(DRIVE.lateness_s, abs=0.0025)
+    assert found.channel.load_friction == pytest.approx(0.2, abs=3.0 * found.load_friction_sigma)
+    assert found.load_friction_sigma < 0.04
+
+
+@pytest.mark.parametrize(("hz", "delay_s"), [(17.0, 0.0), (22.4, 0.0), (29.6, 0.0072)])
+def test_a_low_pass_is_found_whatever_its_corner_frequency(known, hz, delay_s):
+    """Such corner frequencies are the furthest from those with which the search begins."""
+    reference, sensor, columns = known
+    drive = Channel(delay_s=delay_s, time_constant_s=1.0 / (TURN * hz))
+    found = channel_of(reference, sensor, behind(known, drive), columns).channel
+    assert found.time_constant_s == pytest.approx(drive.time_constant_s, rel=0.05)
+    assert found.lateness_s == pytest.approx(drive.lateness_s, abs=0.0003)
+
+
+@pytest.mark.parametrize("hz", [15.0, 20.0])
+def test_a_low_pass_of_second_order_is_found(known, hz):
+    """One of first order would be 1.9 to 2.9 ms later, and leave 12 to 22 times the mean square."""
+    reference, sensor, columns = known
+    drive = Channel(time_constant_s=math.sqrt(2.0) / (TURN * hz), second_order=0.5)
+    found = channel_of(reference, sensor, behind(known, drive), columns)
+    assert found.channel.bandwidth_hz == pytest.approx(hz, rel=0.05)
+    assert found.channel.lateness_s == pytest.approx(drive.lateness_s, abs=0.0005)
+    assert found.square < 0.1
+
+
+@pytest.mark.parametrize(("second_order", "order"), [(0.0, 1), (0.5, 2)])
+def test_low_passes_are_those_of_butterworth(second_order, order):
+    time_constant_s = math.sqrt(order) / (TURN * 20.0)
+    channel = Channel(time_constant_s=time_constant_s, second_order=second_order)
+    omega = TURN * np.array([1.0, 20.0, 100.0])
+    _, expected = signal.freqs(*signal.butter(order, TURN * 20.0, analog=True), omega)
+    np.testing.assert_allclose(channel.response(omega), expected)
+    assert channel.bandwidth_hz == pytest.approx(20.0)
+    two = Channel(time_constant_s=2.0 * time_constant_s, second_order=0.25)  # in a row
+    one = Channel(time_constant_s=time_constant_s)
+    np.testing.assert_allclose(two.response(omega), one.response(omega) ** 2)
+    assert abs(two.response(np.array([TURN * two.bandwidth_hz])))[0] == pytest.approx(math.sqrt(0.5))
+    assert math.isinf(DIRECT.bandwidth_hz)
+
+
+@pytest.mark.parametrize("channel", [pytest.param(DIRECT, marks=pytest.mark.slow), DRIVE])
+def test_a_leg_that_is_commissioned_with_a_worn_joint_has_its_right_channel(known, leg, channel):
+    """Lateness, by joints: 1.0 ± 0.1 and 0.8 ± 0.1 ms RMS (25 draws of cycles); 1.9 if as modelled."""
+    reference, sensor, columns = known
+    behind_it, off_s = attrs.evolve(sensor, channel=channel), []
+    for k in range(len(leg.clearance_joints)):
+        worn = int(np.argmin(np.abs(reference.clearance_m[:, k] - 1.5 * reference.clearance_m[0, k])))
+        measured = simulated_signatures(reference, worn, behind_it).mean(axis=0)
+        found = channel_of(reference, sensor, measured, columns)
+        off_s.append(found.channel.lateness_s - channel.lateness_s)
+        assert found.channel.load_friction == pytest.approx(
+            channel.load_friction, abs=3.0 * found.load_friction_sigma
+        )
+    assert np.sqrt(np.mean(np.square(off_s))) < 0.0017
+
+
+def test_a_direct_drive_has_no_channel(known):
+    reference, sensor, columns = known
+    assert channel_of(reference, sensor, behind(known, DIRECT), columns).channel == DIRECT
+
+
+def test_under_an_unknown_load_the_lag_is_found_and_the_load_friction_is_not_observable(known):
+    reference, sensor, columns = known
+    phase = (np.arange(sensor.phases) + 0.5) / sensor.phases
+    stance = np.concatenate(
+        [60.0 * np.clip(np.sin(TURN * (phase - 0.1)), 0.0, None), np.zeros(sensor.phases)]
+    )
+    measured = behind(known, attrs.evolve(DRIVE, load_friction=0.0)) + stance
+    found = channel_of(reference, sensor, measured, columns)
+    assert found.channel.lateness_s == pytest.approx(DRIVE.lateness_s, abs=0.0025)
+    assert found.channel.load_friction == 0.0
+    assert math.isnan(found.load_friction_sigma)
+
+
+def test_declared_figures_are_used(known):
+    reference, sensor, columns = known
+    figures = DriveFigures(bandwidth_hz=HZ, load_friction=0.2)
+    found = channel_of(reference, sensor, behind(known, DRIVE), columns, figures)
+    assert found.channel.time_constant_s == DRIVE.time_constant_s
+    assert found.channel.delay_s == pytest.approx(DRIVE.delay_s, abs=0.0013)
+    assert found.channel.load_friction == pytest.approx(0.2, abs=0.05)
+    assert figures.lateness_s == pytest.approx(DRIVE.time_constant_s)
+
+
+def test_a_drive_that_rubs_takes_power_whichever_way_the_power_flows():
+    """The motor drives with more than the leg takes, and is driven by less than the leg gives."""
+    torque = np.array([10.0, -10.0, 0.0])
+    rubbing = Channel(load_friction=0.3)
+    np.testing.assert_allclose(rubbing.received(torque, 0.01, 1.0), [13.0, -7.0, 0.0])
+    np.testing.assert_allclose(rubbing.received(torque, 0.01, -1.0), [7.0, -13.0, 0.0])
+
+
+def test_a_drive_without_a_declared_stiffness_or_a_large_one_is_rigid():
+    assert DriveFigures().compliance == DriveFigures(stiffness_nm_per_rad=1.0e5).compliance == 0.0
+    assert DriveFigures(stiffness_nm_per_rad=1000.0).compliance == pytest.approx(1.0e-3)
+
+
+# CUSUM tests on signatures of which the statistics are known.
+
+
+NEW = np.array([3.0e-4, 3.0e-4])
+F = 12
+
+
+def model(entries: int = F) -> SignatureModel:
+    """Two joints whose signatures are linear in the logarithm of their clearances."""
+    random = np.random.default_rng(1)
+    grid = np.tile(NEW[0] * np.array([1.0, 2.0, 5.0]), (2, 1))
+    slopes = random.standard_normal((2, entries))
+    change = np.log(grid / NEW[0])[:, :, None] * 4.0 * slopes[:, None, :]
+    sensor = TorqueSensor(0.005, 1.0, 10.0)
+    return SignatureModel(
+        sensor, random.standard_normal(entries), Changes(grid, change), np.eye(entries), 1.0e-9
+    )
+
+
+def detector(hours: float = 240.0) -> ChangeDetector:
+    none = Baseline(np.zeros(F), np.zeros((F, F)))
+    return ChangeDetector(Explainer(model(), ("A", "B"), none, ()), NEW, 3600.0 * hours)
+
+
+def walked(tests, clearance, cycles, seed, begin=0):
+    """State after some cycles, and the cycles until a detection."""
+    random, state = np.random.default_rng(seed), tests.fresh()
+    mean = model().at(np.asarray(clearance))[0]
+    for i in range(cycles):
+        state = tests.with_cycle(state, mean + random.standard_normal(F), begin + 1 + i)
+        found = tests.detected_ns(state)
+        if found:
+            return state, found, i + 1
+    return state, 0, cycles
+
+
+def test_the_threshold_grows_with_the_time_between_false_alarms_and_with_the_tests() -> None:
+    assert threshold(math.e, 1) == pytest.approx(1.0)
+    assert threshold(1000.0, 20) == pytest.approx(math.log(20_000.0))
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_the_widest_joint_that_is_not_seen_is_the_last_that_is_not_found(k: int) -> None:
+    """Within as many gait cycles, on a leg that shows 0.8 of what the model expects."""
+    tests, own, cycles = detector(), model(), 8
+    unseen = tests.unseen_m(cycles)[k]
+    after = FACTORS[int(np.searchsorted(FACTORS, unseen / NEW[k] + 1e-9))]
+    for size, least, most in ((unseen, 0, 11), (after * NEW[k], 14, 20)):
+        wide, found = NEW.copy(), 0
+        wide[k] = size
+        mean = own.mean + 0.8 * (own.at(wide)[0] - own.mean)
+        for seed in range(20):
+            random, state = np.random.default_rng(seed), tests.fresh()
+            for i in range(round(1.3 * cycles)):
+                state = tests.with_cycle(state, mean + random.standard_normal(F), 1 + i)
+            found += tests.detected_ns(state) > 0
+        assert least <= found <= most
+
+
+def test_a_joint_that_the_torque_does_not_show_is_never_seen() -> None:
+    own = model()
+    change = own.joints.change * np.array([1.0, 0.0])[:, None, None]
+    hidden = attrs.evolve(own, joints=attrs.evolve(own.joints, change=change))
+    none = Baseline(np.zeros(F), np.zeros((F, F)))
+    tests = ChangeDetector(Explainer(hidden, ("A", "B"), none, ()), NEW, 1e6)
+    unseen = tests.unseen_m(10**6)
+    assert unseen[0] == NEW[0]
+    assert unseen[1] == FACTORS[-1] * NEW[1]
+
+
+def test_false_alarms_are_as_rare_as_chosen() -> None:
+    """With a chosen mean of 200 cycles, in 6000 cycles at most 30 are expected; the bound is conservative."""
+    tests, alarms = detector(200.0 / 3600.0), 0
+    random, state, mean = np.random.default_rng(5), tests.fresh(), model().mean
+    for i in range(6000):
+        state = tests.with_cycle(state, mean + random.standard_normal(F), i + 1)
+        if tests.detected_ns(state):
+            alarms, state = alarms + 1, tests.fresh()
+    assert alarms <= 30
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_a_wider_joint_is_detected_within_a_few_cycles_and_named(k: int) -> None:
+    for seed in range(20):
+        wide = NEW.copy()
+        wide[k] *= 1.5
+        state, found, cycles = walked(detector(), wide, 100, seed)
+        assert found
+        assert cycles <= 20
+        assert int(state.sums.argmax()) // len(FACTORS) == k
+
+
+def test_two_cycles_alone_raise_nothing() -> None:
+    tests, strange = detector(), model().at(5.0 * NEW)[0]
+    state = tests.fresh()
+    for i in (1, 2):
+        state = tests.with_cycle(state, strange, i)
+        assert not tests.detected_ns(state)
+    assert tests.detected_ns(tests.with_cycle(state, strange, 3))
+
+
+def test_since_is_the_begin_of_the_change() -> None:
+    tests, random = detector(), np.random.default_rng(2)
+    state, wide = tests.fresh(), model().at(np.array([6.0e-4, 3.0e-4]))[0]
+    for i in range(40):
+        mean = model().mean if i < 30 else wide
+        state = tests.with_cycle(state, mean + random.standard_normal(F), 1000 + i)
+        found = tests.detected_ns(state)
+        if found:
+            break
+    assert 1028 <= found <= 1030
+
+
+def test_the_offset_of_a_commissioned_leg_is_not_taken_for_a_clearance() -> None:
+    own, offset = model(), 5.0 * np.random.default_rng(3).standard_normal(F)
+    explainer = Explainer(own, ("A", "B"), Baseline(offset, np.zeros((F, F))), ())
+    wide = np.array([6.0e-4, 3.0e-4])
+    found = fit_clearances(explainer, own.at(wide)[0] + offset, 100, NEW, NEW)
+    assert found.clearance_m == pytest.approx(wide, rel=0.02)
+
+
+def test_later_cycles_scatter_as_the_tests_expect() -> None:
+    """Seen before: tests expected half of it, since their covariance was made of the cycles they knew."""
+    entries = 160
+    legs, found = model(entries), []
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        root = np.eye(entries) + 0.08 * random.standard_normal((entries, entries))
+        known, later = (legs.mean + random.standard_normal((n, entries)) @ root.T for n in (50, 2000))
+        own = attrs.evolve(legs, covariance=with_scatter_of(legs.covariance, known))
+        baseline = commissioned_baseline(
+            CommissionedTorque(1, NEW, known),
+            legs.mean,
+            own.covariance,
+            parts_left_out(legs.covariance, known),
+        )
+        tests = ChangeDetector(Explainer(own, ("A", "B"), baseline, ()), NEW, 1000.0)
+        ratio = (later - later.mean(axis=0)) @ tests._weighted.T / np.sqrt(tests._excess)
+        supposed = ((tests._weighted @ own.covariance) * tests._weighted).sum(axis=1)
+        there = supposed > 0.0
+        found.append((ratio.var(axis=0)[there] / supposed[there]).mean())
+    # 0.98, with a standard error of 0.024; 1.45 before
+    assert 0.85 < np.mean(found) < 1.12
+
+
+def test_a_leg_that_scatters_more_than_expected_counts_less() -> None:
+    random = np.random.default_rng(4)
+    found = excess(random.standard_normal((4000, 3)) * [0.5, 1.0, 2.0])
+    assert found == pytest.approx([1.0, 1.0, 4.0], rel=0.1)
+    assert excess(np.zeros((0, 3))).tolist() == [1.0, 1.0, 1.0]
+    alternating = np.tile([[1.0], [-1.0]], (50, 1))  # neighbours that cancel add up to nothing
+    assert excess(alternating).tolist() == [1.0]

@@ -42,10 +42,6 @@ def life() -> Iterator[Row]:
     yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
     counted = "Whether its wear is counted; false for a pair without wear coefficient, whose clearance stays."
     yield "validity.<joint>.is_counted", "true or false", "", counted
-    rating = (
-        "Life by the formula of the pair's maker when new, all factors 1; null without one, or beyond it."
-    )
-    yield "validity.<joint>.rating_life_h", "number or null", "h", rating
     yield "validity.<joint>.mean_pressure_speed_pa_mps", *_LOAD
     beyond = "What of it is beyond the limits of the joint's material; None within them."
     yield "validity.<joint>.outside_limits", "text or null", "", beyond

@@ -20,9 +20,8 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.simulation import simulate
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.files import finite_or_none
 from leg_wear_monitor.life.life import LifeRun, simulate_life
-from leg_wear_monitor.life.result import Duty, Life, rating_hours
+from leg_wear_monitor.life.result import Duty, Life
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import (
     USUAL_SPREAD,
@@ -63,12 +62,10 @@ class BushingLife:
         True if nine of ten such bushings last the hours wanted.
     limited_by : str
         ``p``, ``v``, ``p v`` or ``impact`` if a limit of the maker is exceeded, so that no life holds; else
-        ``wear`` or ``rating life``; ``nothing`` without wear; ``unknown`` if the pair gives neither.
+        ``wear``; ``nothing`` without wear; ``unknown`` if the pair gives no wear coefficient.
     wear_h : tuple of three floats, or None
         Hours until the clearance reaches its limit, as 10th, 50th and 90th percentile; None without a wear
         coefficient, or if the joint does not wear.
-    rating_h : float or None
-        Life by the formula of the pair's maker, all factors 1; None without one, or beyond its range.
     load : BushingLoad
         Pressure and sliding speed with the pair's limits.
     peak_pressure_pa : float
@@ -84,7 +81,6 @@ class BushingLife:
     lasts: bool
     limited_by: str
     wear_h: tuple[float, float, float] | None
-    rating_h: float | None
     load: BushingLoad
     peak_pressure_pa: float
 
@@ -163,7 +159,7 @@ def design(
 
 def _smallest_that_lasts(row: BushingLife) -> tuple[bool, float, float]:
     """Order of the rows of a joint: first the bushings that last, then by size, then by life."""
-    longest = row.wear_h[1] if row.wear_h else row.rating_h or 0.0
+    longest = row.wear_h[1] if row.wear_h else 0.0
     return not row.lasts, row.diameter_m * row.width_m, -longest
 
 
@@ -214,12 +210,11 @@ def _row(
     of_pair = Bushing.of(bushing, is_swinging=is_swinging)
     load = of_pair.load(float(forces_n[0]), float(forces_n[1]), float(rubbing_w[0]))
     peak_pa = float(life.peak_force_n[0, k]) / of_pair.area_m2
-    rating_h = finite_or_none(rating_hours(bushing, load.mean_pressure_speed_pa_mps))
     wear_h = None if lacks_wear(bushing) else _wear_hours(bushing, life.clearance_m[:, k], rubbing_w, limit_m)
     # The scatter of the motion is a few percent; the scatter of wear coefficients is a factor of two.
     away = math.exp(_P90 * (spread_of(bushing, USUAL_SPREAD) or USUAL_SPREAD))
-    limited_by = _limited_by(bushing, load, peak_pa, wear_h, rating_h)
-    surely_h = {"wear": (wear_h or 0.0) / away, "rating life": rating_h or 0.0, "nothing": math.inf}
+    limited_by = _limited_by(bushing, load, peak_pa, wear_h)
+    surely_h = {"wear": (wear_h or 0.0) / away, "nothing": math.inf}
     return BushingLife(
         joint=joint,
         material=bushing.material,
@@ -230,7 +225,6 @@ def _row(
         lasts=surely_h.get(limited_by, 0.0) >= hours,
         limited_by=limited_by,
         wear_h=(wear_h / away, wear_h, wear_h * away) if wear_h and math.isfinite(wear_h) else None,
-        rating_h=rating_h,
         load=load,
         peak_pressure_pa=peak_pa,
     )
@@ -246,9 +240,7 @@ def _wear_hours(bushing: Clearance, clearance_m: Floats, rubbing_w: Floats, limi
     return float(step * (slowness.sum() - 0.5 * (slowness[0] + slowness[-1]))) / 3600.0
 
 
-def _limited_by(
-    bushing: Clearance, load: BushingLoad, peak_pa: float, wear_h: float | None, rating_h: float | None
-) -> str:
+def _limited_by(bushing: Clearance, load: BushingLoad, peak_pa: float, wear_h: float | None) -> str:
     """The reason for which the life of a bushing ends, or is not known."""
     fractions = load.fractions
     if max(fractions.values(), default=0.0) > 1.0:
@@ -256,6 +248,6 @@ def _limited_by(
     limits = load_material(bushing.material).limits if bushing.material else None
     if limits and limits.static_pressure and peak_pa > limits.static_pressure.si:
         return "impact"
-    if wear_h is not None:
-        return "wear" if math.isfinite(wear_h) else "nothing"
-    return "unknown" if rating_h is None else "rating life"
+    if wear_h is None:
+        return "unknown"
+    return "wear" if math.isfinite(wear_h) else "nothing"

@@ -11,15 +11,9 @@ from leg_wear_monitor.contact.geometry import contact_doubt, half_angle_of
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, finite_or_none, json_text
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import (
-    bushing_of,
-    lacks_wear,
-    load_material,
-    rating_life_hours,
-    regime_of,
-)
+from leg_wear_monitor.mechanism.materials import bushing_of, lacks_wear, regime_of
 from leg_wear_monitor.mechanism.person import with_ground_reaction
-from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -254,7 +248,7 @@ class Life:
         return data_frame(self.columns(), index=["joint", "cycles"])
 
 
-# Load of the bushings of a leg that wears, for the limits and formulas of their makers.
+# Load of the bushings of a leg that wears, for the limits of their makers.
 
 
 def pressure_speed(mechanism: Mechanism, life: Life) -> dict[str, float]:
@@ -287,25 +281,17 @@ def contact_doubts(mechanism: Mechanism, life: Life) -> dict[str, str]:
     return found
 
 
-def rating_hours(settings: Clearance, load: float) -> float | None:
-    """Life by the formula of the pair's maker [h], all factors 1; NaN beyond its range, None without one."""
-    constants = load_material(settings.material).rating_life if settings.material else None
-    return None if constants is None else rating_life_hours(load, constants)
-
-
 def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
     """Validity of each joint's life for ``life --json``; same parameters as `pressure_speed`."""
     loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
     found = {}
     for joint in life.clearance_joints:
         settings, load = mechanism.clearances[joint], loads[joint]
-        hours = rating_hours(settings, load)
         found[joint] = {
             "holds_for": regime_of(settings),
             "is_counted": not lacks_wear(settings),
             "mean_pressure_speed_pa_mps": load,
             "outside_limits": bushing_of(mechanism, joint).loaded(0.0, 0.0, 0.0, load).outside_limits,
-            "rating_life_h": None if hours is None or math.isnan(hours) else hours,
             "outside_contact_law": contacts.get(joint),
         }
     return found

@@ -1,4 +1,4 @@
-"""Figures with their sources: drives, material pairs of bushing and journal, their loads and rating life."""
+"""Figures with their sources: drives, material pairs of bushing and journal, and the loads of bushings."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,30 +13,10 @@ from leg_wear_monitor.configuration.strict import Library
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
-# Units of the files of materials and drives, by measured quantity, and their factors to SI.
+# Units of the files of materials and drives: the measured quantity, and the factor to SI.
 #
-# Two units need care. A dimensionless K of Archard's law has no meaning without the form of the law:
-# books write V = K F s / H and V = K F s / (3 H), so the unit names the form, and K / H or K / (3 H) is the
-# wear coefficient of this package. Makers give a wear rate in µm/km at a pressure, so the unit names 1 MPa.
-
-
-@attrs.frozen
-class Unit:
-    """A unit of a file of a material or a drive.
-
-    Attributes
-    ----------
-    dimension : str
-        Measured quantity.
-    factor : float
-        SI value of one such unit; of a K, the factor before K / H.
-    needs_hardness : bool
-        True if the number is a K, to be divided by a hardness.
-    """
-
-    dimension: str
-    factor: float
-    needs_hardness: bool = False
+# Makers give a wear rate in µm/km at a pressure, so the unit names 1 MPa. A dimensionless K of Archard's law
+# is no unit: books write V = K F s / H and V = K F s / (3 H), so a file has K / H or K / (3 H).
 
 
 _MM3, _INCH, _POUND = 1.0e-9, 0.0254, 4.4482216152605  # m^3, m, N
@@ -44,37 +24,34 @@ _PSI = _POUND / _INCH**2
 _FOOT_PER_MINUTE = 12.0 * _INCH / 60.0
 
 UNITS = {
-    "Pa": Unit("pressure", 1.0),
-    "MPa": Unit("pressure", 1.0e6),
-    "GPa": Unit("pressure", 1.0e9),
-    "N/mm^2": Unit("pressure", 1.0e6),
-    "psi": Unit("pressure", _PSI),
-    "kgf/mm^2": Unit("pressure", 9.80665e6),
-    "m/s": Unit("speed", 1.0),
-    "ft/min": Unit("speed", _FOOT_PER_MINUTE),
-    "Pa m/s": Unit("pressure times speed", 1.0),
-    "MPa m/s": Unit("pressure times speed", 1.0e6),
-    "N/mm^2 m/s": Unit("pressure times speed", 1.0e6),
-    "psi ft/min": Unit("pressure times speed", _PSI * _FOOT_PER_MINUTE),
-    "1/Pa": Unit("wear coefficient", 1.0),
-    "mm^3/(N m)": Unit("wear coefficient", _MM3),
-    "um/km at 1 MPa": Unit("wear coefficient", 1.0e-6 / 1.0e3 / 1.0e6),
+    "Pa": ("pressure", 1.0),
+    "MPa": ("pressure", 1.0e6),
+    "GPa": ("pressure", 1.0e9),
+    "N/mm^2": ("pressure", 1.0e6),
+    "psi": ("pressure", _PSI),
+    "m/s": ("speed", 1.0),
+    "ft/min": ("speed", _FOOT_PER_MINUTE),
+    "Pa m/s": ("pressure times speed", 1.0),
+    "MPa m/s": ("pressure times speed", 1.0e6),
+    "N/mm^2 m/s": ("pressure times speed", 1.0e6),
+    "psi ft/min": ("pressure times speed", _PSI * _FOOT_PER_MINUTE),
+    "1/Pa": ("wear coefficient", 1.0),
+    "mm^3/(N m)": ("wear coefficient", _MM3),
+    "um/km at 1 MPa": ("wear coefficient", 1.0e-6 / 1.0e3 / 1.0e6),
     # volume over force, speed in ft/min and time in h: 60 ft of sliding for each ft/min and hour
-    "in^3 min/(lbf ft h)": Unit("wear coefficient", _INCH**3 / (_POUND * 12.0 * _INCH * 60.0)),
-    "K of V = K F s / H": Unit("wear coefficient", 1.0, needs_hardness=True),
-    "K of V = K F s / (3 H)": Unit("wear coefficient", 1.0 / 3.0, needs_hardness=True),
-    "degC": Unit("temperature", 1.0),
-    "um": Unit("roughness", 1.0e-6),
-    "ln": Unit("logarithmic standard deviation", 1.0),
-    "1": Unit("number", 1.0),
-    "s": Unit("time", 1.0),
-    "ms": Unit("time", 1.0e-3),
-    "Hz": Unit("frequency", 1.0),
-    "N m": Unit("torque", 1.0),
-    "N mm": Unit("torque", 1.0e-3),
-    "N m s/rad": Unit("friction by speed", 1.0),
-    "N m/rad": Unit("stiffness", 1.0),
-    "N m/A": Unit("torque constant", 1.0),
+    "in^3 min/(lbf ft h)": ("wear coefficient", _INCH**3 / (_POUND * 12.0 * _INCH * 60.0)),
+    "degC": ("temperature", 1.0),
+    "um": ("roughness", 1.0e-6),
+    "ln": ("logarithmic standard deviation", 1.0),
+    "1": ("number", 1.0),
+    "s": ("time", 1.0),
+    "ms": ("time", 1.0e-3),
+    "Hz": ("frequency", 1.0),
+    "N m": ("torque", 1.0),
+    "N mm": ("torque", 1.0e-3),
+    "N m s/rad": ("friction by speed", 1.0),
+    "N m/rad": ("stiffness", 1.0),
+    "N m/A": ("torque constant", 1.0),
 }
 
 
@@ -118,7 +95,7 @@ class SourcedValue:
     @property
     def si(self) -> float:
         """The value in SI units; a temperature in degrees Celsius."""
-        return self.central * UNITS[self.unit].factor
+        return self.central * UNITS[self.unit][1]
 
     @property
     def text(self) -> str:
@@ -130,40 +107,10 @@ class SourcedValue:
         return f"{self.value:g}{unit}" + (f" ({interval})" if interval else "")
 
 
-@attrs.frozen(kw_only=True)
-class WearCoefficient(SourcedValue):
-    """A wear coefficient; a dimensionless K comes with the hardness that it belongs to."""
-
-    hardness: SourcedValue | None = described(
-        "hardness that divides a dimensionless K",
-        default=None,
-        check=lambda value: unit_fault("pressure", value),
-    )
-    spread: SourcedValue | None = described(
-        "logarithmic standard deviation of the coefficient, from part to part and from test to test",
-        default=None,
-        check=lambda value: unit_fault("logarithmic standard deviation", value),
-    )
-
-    def __attrs_post_init__(self) -> None:
-        super().__attrs_post_init__()
-        needs = UNITS[self.unit].needs_hardness
-        if needs and self.hardness is None:
-            raise FieldError("hardness", f"is missing. Expected the hardness H of {self.unit}")
-        if not needs and self.hardness is not None:
-            raise FieldError("hardness", f"does not belong to a coefficient in {self.unit}")
-
-    @property
-    def si(self) -> float:
-        """The wear coefficient k of V = k F s [1/Pa]."""
-        coefficient = self.central * UNITS[self.unit].factor
-        return coefficient if self.hardness is None else coefficient / self.hardness.si
-
-
 def unit_fault(dimension: str, value: SourcedValue) -> str | None:
     """Fault of the unit or the sign of a value with this dimension; None if there is none."""
-    if UNITS[value.unit].dimension != dimension:
-        known = " or ".join(name for name, unit in UNITS.items() if unit.dimension == dimension)
+    if UNITS[value.unit][0] != dimension:
+        known = " or ".join(name for name, (measures, _) in UNITS.items() if measures == dimension)
         return f"unit {value.unit!r} is not one of {dimension}. Expected {known}"
     if dimension != "temperature" and not (value.central > 0.0 and min(value.range or (0.0,)) >= 0.0):
         return f"{value.central!r} {value.unit} is not above 0"
@@ -304,7 +251,11 @@ class Side:
     material: str = described("material of the body")
     youngs_modulus: SourcedValue | None = sourced("pressure", "Young's modulus")
     poissons_ratio: SourcedValue | None = sourced("number", "Poisson's ratio")
-    wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "wear coefficient of this body")
+    wear_coefficient: SourcedValue | None = sourced("wear coefficient", "wear coefficient of this body")
+    wear_spread: SourcedValue | None = sourced(
+        "logarithmic standard deviation",
+        "logarithmic standard deviation of the coefficient, from part to part and from test to test",
+    )
     roughness: SourcedValue | None = sourced("roughness", "surface roughness Ra that the source requires")
     is_counted: bool = described(
         "false if the source gives only the wear of the other body",
@@ -335,18 +286,6 @@ class Limits:
 
 
 @attrs.frozen(kw_only=True)
-class RatingLife:
-    """Constants of the maker's formula of the life of a bushing."""
-
-    constant: SourcedValue = sourced("number", "K_M, for p in N/mm^2, v in m/s and a life in h")
-    exponent: SourcedValue = sourced("number", "n of (p v)^n")
-    least_pressure_speed: SourcedValue = sourced("pressure times speed", "least p v to insert")
-    largest_pressure_speed: SourcedValue | None = sourced(
-        "pressure times speed", "largest p v for which these constants hold"
-    )
-
-
-@attrs.frozen(kw_only=True)
 class Material(SourcedFile):
     """A pair of bushing and journal with its lubricant."""
 
@@ -358,7 +297,6 @@ class Material(SourcedFile):
     regime: str = described("wear regime for which the values are valid")
     friction: SourcedValue | None = sourced("number", "friction coefficient")
     limits: Limits = described("limits, a mapping of the keys below", factory=Limits)
-    rating_life: RatingLife | None = described("constants of the maker's formula of life", default=None)
     notes: str = described("further notes for users", default="")
 
     @property
@@ -584,7 +522,7 @@ def lacks_wear(settings: Clearance) -> bool:
 
 
 def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
-    """Check that there is something to compute a life from: a coefficient, or a formula of the maker.
+    """Check that there is a wear coefficient to compute a life from.
 
     Raises
     ------
@@ -596,7 +534,7 @@ def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
             mechanism.source, "clearances.joints", "no joint has clearance, so nothing can wear"
         )
     known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
-    if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
+    if known and all(lacks_wear(each) for each in known):
         raise ConfigError(
             mechanism.source,
             f"clearances.joints.{joints[0]}.wear_coefficient",
@@ -653,37 +591,9 @@ def spread_of(settings: Clearance, usual: float) -> float | None:
     if not settings.material:
         return None
     pair = load_material(settings.material)
-    both = pair.bushing.wear_coefficient, pair.journal.wear_coefficient
-    if settings.wear_coefficient != pair.wear_coefficients or not any(both):
-        return None
-    spreads = [side.spread if side is not None else None for side in both]
-    if not any(spreads):
+    spreads = pair.bushing.wear_spread, pair.journal.wear_spread
+    if settings.wear_coefficient != pair.wear_coefficients or not any(spreads):
         return None
     known = [usual if spread is None else spread.si for spread in spreads]
     weighted = sum(k * spread for k, spread in zip(settings.wear_coefficient, known, strict=True))
     return weighted / sum(settings.wear_coefficient)
-
-
-# A maker's rating life of a bushing, for comparison with a life by Archard's law.
-#
-# SKF, Plain bearings, Calculation example, and Federal-Mogul, GLYCODUR, Nominal service life:
-# G_h = c1 c2 c3 c4 c5 K_M / (p v)^n, with p in N/mm^2, v in m/s and the life in h. The factors are read from
-# the makers' diagrams: load, speed, temperature, roughness, kind of load.
-
-
-def rating_life_hours(pressure_speed: float, constants: RatingLife) -> float:
-    """Basic rating life G_h [h], all factors 1; NaN above the p v for which the constants hold.
-
-    Parameters
-    ----------
-    pressure_speed : float
-        Specific load times mean sliding speed [Pa m/s]; the constants have a least value for it.
-    constants : RatingLife
-        Constants of a pair.
-    """
-    largest = constants.largest_pressure_speed
-    if largest is not None and pressure_speed > largest.si:
-        return math.nan
-    inserted = 1.0e-6 * max(pressure_speed, constants.least_pressure_speed.si)
-    divided_by: float = inserted**constants.exponent.si
-    return constants.constant.si / divided_by

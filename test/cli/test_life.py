@@ -37,29 +37,21 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, refused, tmp_path):
     assert "belongs to a different leg" in refused("check", "leg.yaml")
 
 
-def test_life_tells_regime_limits_and_the_makers_own_life(run, refused, shipped, tmp_path):
-    """A pair with limits only is refused; with a coefficient beside it, the maker's life is printed, too."""
-    pair = "material: skf-ptfe-composite-on-steel"
+def test_life_tells_regime_and_limits(run, refused, shipped, tmp_path):
+    """A pair with limits only is refused; a coefficient beside it counts."""
     text = shipped("four_bar")
     limited = text.replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry")
     (tmp_path / "limited.yaml").write_text(limited)
     assert "wear_coefficient: is missing for a life: du-on-steel-dry" in refused(
         "life", "--mechanism", "limited.yaml"
     )
-    (tmp_path / "rule.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
-    rule = run("life", "--mechanism", "rule.yaml", *ONE[3:])
-    assert rule.code == 0
-    assert "B has no modelled wear, because its material pair has no wear coefficient" in rule.out
-    assert "nan" not in rule.out
-    (rating,) = [one for one in rule.out.splitlines() if one.startswith("B: the maker's rating life is ")]
     (tmp_path / "beside.yaml").write_text(
-        text.replace("wear_coefficient: 1.0e-15", f"{pair}\n    wear_coefficient: 1.0e-15")
+        text.replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry\n    wear_coefficient: 1.0e-15")
     )
     result = run("life", "--mechanism", "beside.yaml", *ONE[3:], "--limit-m", "5.2e-4")
     assert result.code == 0
-    assert "B holds for a value beside skf-ptfe-composite-on-steel (dry)\n" in result.out
-    assert result.out.count("maker's rating life") == 2
-    assert rating in result.out  # the formula knows nothing of a coefficient
+    assert "nan" not in result.out
+    assert "B holds for a value beside du-on-steel-dry (dry)\n" in result.out
 
 
 def test_life_under_a_duty_tells_hours_and_days(run):

@@ -120,14 +120,12 @@ def fleet_keys(name: str) -> str:
 
 def sourced_keys(kind: Any) -> str:
     """Keys of a file whose values have sources."""
-    inherited = {field.name for field in attrs.fields(materials.SourcedValue)}
     rows = (
         (
             f"`{field.name}`", field.metadata.get("dimension", ""),
             "yes" if field.default is attrs.NOTHING else "", field.metadata["doc"],
         )
         for field in attrs.fields(kind)
-        if not (kind is materials.WearCoefficient and field.name in inherited)
     )  # fmt: skip
     return table("key | measures | required | meaning", rows)
 
@@ -136,9 +134,9 @@ def units(of_drives: bool) -> str:
     """Units of the files of drives, or of those of materials; both may have a number."""
     dimensions = {field.metadata.get("dimension") for field in attrs.fields(materials.Drive)}
     rows = (
-        (f"`{name}`", unit.dimension, f"{unit.factor:.6g}")
-        for name, unit in materials.UNITS.items()
-        if (unit.dimension in dimensions) is of_drives or unit.dimension == "number"
+        (f"`{name}`", measures, f"{factor:.6g}")
+        for name, (measures, factor) in materials.UNITS.items()
+        if (measures in dimensions) is of_drives or measures == "number"
     )
     return table("unit | measures | factor to SI", rows)
 

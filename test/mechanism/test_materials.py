@@ -1,4 +1,4 @@
-"""Material pairs: their files, limits, and rating lives."""
+"""Material pairs: their files and limits."""
 
 import math
 from pathlib import Path
@@ -16,16 +16,10 @@ from leg_wear_monitor.mechanism.materials import (
     BushingLoad,
     Material,
     SourcedValue,
-    WearCoefficient,
     bushing_of,
-    rating_life_hours,
 )
 
 # Files of materials, and of drives: sources, units and their traps, and one line for a bad one.
-
-
-def wear(value: float, unit: str, hardness: SourcedValue | None = None) -> float:
-    return WearCoefficient(value=value, unit=unit, source="a", conditions="b", hardness=hardness).si
 
 
 def number(value: float, unit: str) -> SourcedValue:
@@ -64,7 +58,6 @@ def test_every_number_of_every_file_has_a_source(kind: str, name: str) -> None:
         (13050, "psi", 89.9766e6),  # and 90 MPa
         (196, "ft/min", 0.99568),
         (1.0, "N/mm^2 m/s", 1.0e6),
-        (1.0, "kgf/mm^2", 9.80665e6),
         (1.0, "mm^3/(N m)", 1.0e-9),  # a cube of 1 mm a N m, in m^3 a J
         (1.0, "um/km at 1 MPa", 1.0e-15),  # depth over distance and pressure
     ],
@@ -77,25 +70,18 @@ def test_inch_units_of_the_makers_page_are_its_metric_ones() -> None:
     """RTP, Quadrant: 1e-10 in^3 min/(lbf ft h) and 1e-8 mm^3/(N m) of the same test, rounded."""
     pairs = ((13, 26), (132, 265), (61, 122), (228, 459), (4, 8), (149, 300), (80, 161), (35, 70.5))
     for inch, metric in pairs:
-        rounding = 0.5e-10 * UNITS["in^3 min/(lbf ft h)"].factor + 0.5e-8 * 1.0e-9
-        difference = wear(inch * 1.0e-10, "in^3 min/(lbf ft h)") - wear(metric * 1.0e-8, "mm^3/(N m)")
+        rounding = 0.5e-10 * UNITS["in^3 min/(lbf ft h)"][1] + 0.5e-8 * 1.0e-9
+        difference = (
+            number(inch * 1.0e-10, "in^3 min/(lbf ft h)").si - number(metric * 1.0e-8, "mm^3/(N m)").si
+        )
         assert abs(difference) < rounding
 
 
-def test_the_factor_three_of_archards_k() -> None:
-    hardness = number(120.0, "kgf/mm^2")
-    thirds, whole = (wear(7.0e-3, f"K of V = K F s / {h}", hardness) for h in ("(3 H)", "H"))
-    assert whole == pytest.approx(3.0 * thirds)
-    assert thirds == pytest.approx(7.0e-3 / (3.0 * 120.0 * 9.80665e6))
-    # the example of the source: 1 m, 10 kgf = 98 N gives 2e-10 m^3
-    assert thirds * 98.0 * 1.0 == pytest.approx(2.0e-10, rel=0.05)
-
-
-def test_a_k_without_hardness_is_refused_and_hardness_without_a_k() -> None:
-    with pytest.raises(ValueError, match=r"hardness: is missing\. Expected the hardness H"):
-        wear(7.0e-3, "K of V = K F s / H")
-    with pytest.raises(ValueError, match="hardness: does not belong to a coefficient in 1/Pa"):
-        wear(1.0e-15, "1/Pa", number(1.0, "GPa"))
+def test_a_k_of_a_book_is_divided_by_three_hardnesses() -> None:
+    """V = K F s / (3 H), K 0.007 and H 120 kgf/mm^2; the example: 98 N over 1 m give 2e-10 m^3."""
+    (k, other) = lw.load_material("steel-on-steel-dry-severe").wear_coefficients
+    assert k == other == pytest.approx(7.0e-3 / (3.0 * 120.0 * 9.80665e6), rel=1.0e-12)
+    assert k * 98.0 * 1.0 == pytest.approx(2.0e-10, rel=0.05)
 
 
 def test_a_range_stands_for_its_geometric_middle() -> None:
@@ -220,40 +206,6 @@ def test_the_load_follows_from_forces_and_rubbing() -> None:
     assert load.mean_sliding_speed_mps == pytest.approx(0.3)
     assert load.mean_pressure_speed_pa_mps == pytest.approx(0.6e6)
     assert Bushing.of(SETTINGS).load(0.0, 0.0, 0.0).mean_sliding_speed_mps == 0.0
-
-
-# SKF's formula of the life of a bushing gives SKF's own example.
-
-
-def test_the_published_example() -> None:
-    """The door of a tramway: published 1.64 N/mm^2, 0.01 m/s and 22 500 h; 22 464 h by the formula."""
-    pair = lw.load_material("skf-ptfe-composite-on-steel")
-    assert pair.rating_life is not None
-    assert pair.limits.dynamic_pressure is not None
-    pressure = pair.limits.dynamic_pressure.si * 800.0 / 39_000.0
-    assert pressure == pytest.approx(1.64e6, rel=2.0e-3)
-    speed = 5.82e-7 * 20.0 * 90.0 * 10.0  # of 20 mm by 90 degrees, ten times a minute
-    assert pressure * speed < 0.025e6  # so the least p v stands for it
-    hours = 1.3 * 0.6 * 1.5 * rating_life_hours(pressure * speed, pair.rating_life)  # c1, c4, c5
-    assert hours == pytest.approx(22_464.0)
-    assert hours == pytest.approx(22_500.0, rel=2.0e-3)
-
-
-def test_the_constants_hold_for_their_range_only() -> None:
-    """GLYCODUR A: K_M 1900, n 1 up to 1 MPa m/s, at least 0.1 inserted."""
-    constants = lw.load_material("glycodur-a-on-steel").rating_life
-    assert constants is not None
-    hours = [rating_life_hours(1.0e6 * pv, constants) for pv in (0.05, 0.1, 0.5, 1.0)]
-    assert hours == pytest.approx([19_000.0, 19_000.0, 3800.0, 1900.0])
-    assert math.isnan(rating_life_hours(1.01e6, constants))
-
-
-def test_above_the_least_value_the_life_falls_with_p_v() -> None:
-    constants = lw.load_material("skf-ptfe-composite-on-steel").rating_life
-    assert constants is not None
-    one, two = (rating_life_hours(pv, constants) for pv in (0.1e6, 0.2e6))
-    assert one == pytest.approx(4800.0)
-    assert one / two == pytest.approx(2.0**constants.exponent.si)
 
 
 def test_joints_that_swing_have_limits_of_their_own() -> None:

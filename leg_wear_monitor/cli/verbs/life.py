@@ -130,8 +130,6 @@ def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list
             lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
     for joint, known in validity.items():
         lines.append(f"{joint} holds for {known['holds_for']}")
-        if known["rating_life_h"] is not None:
-            lines.append(f"{joint}: the maker's rating life is {known['rating_life_h']:.3g} h, all factors 1")
         doubts = filter(None, (known["outside_limits"], known["outside_contact_law"]))
         lines += [f"{joint}: {doubt}" for doubt in doubts]
     return lines
@@ -194,8 +192,7 @@ def design(
     """Find bushings for a wanted life of each joint of a leg.
 
     One life of the leg under the duty gives forces and sliding over the clearance. They give the life of
-    every pair and size, by wear or by the maker's formula, and the maker's limits that are exceeded. Check a
-    choice with the verb life.
+    every pair and size, and the maker's limits that are exceeded. Check a choice with the verb life.
     """
     import attrs
 
@@ -241,7 +238,7 @@ def design_lines(table: "Sequence[BushingLife]", hours: float) -> list[str]:
     return lines
 
 
-_LIVES = {"nothing": "does not wear", "unknown": "not known: the pair has no wear coefficient and no formula"}
+_LIVES = {"nothing": "does not wear", "unknown": "not known: the pair has no wear coefficient"}
 
 
 def _design_line(joint: str, row: "BushingLife") -> str:
@@ -249,7 +246,5 @@ def _design_line(joint: str, row: "BushingLife") -> str:
     if row.limited_by == "wear" and row.wear_h:
         p10, p50, p90 = (f"{float(f'{each:.3g}'):g}" for each in row.wear_h)
         life = f"{p50} ({p10} to {p90})"
-    elif row.limited_by == "rating life":
-        life = f"{float(f'{row.rating_h:.3g}'):g} by the maker's formula"
     sizes = f"{1e3 * row.diameter_m:8g}{1e3 * row.width_m:10g}{1e6 * row.clearance_m:14g}"
     return f"{joint:8}{row.material or 'no pair named':32}{sizes}  {life}"

@@ -1,4 +1,4 @@
-"""Cycle jumps compared with every single cycle, ten million cycles to the limit, and the law of growth.
+"""Cycle jumps compared with every single cycle, and ten million cycles to the limit.
 
 `python benchmarks/life.py` simulates 20 000 cycles of accelerated wear one by one (seven to ten minutes of a
 core), and the same by jumps of several lengths, from several starts each.
@@ -13,13 +13,11 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run import DONE, new_run_statistics, steady_drive
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.growth import law_of, left_over, read_lives
 from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
 
 HASTE = 500.0
@@ -83,7 +81,6 @@ def ten_million(leg: Mechanism) -> None:
     cycles = life.cycles_to(k, LIMIT_M)
     print(f"\nto the limit: {cycles:.3g} cycles in {took:.1f} s, {len(life.cycles) - 1} jumps")
     settings, growth = Forecasting(), life.growth_m_per_cycle[:3].mean(axis=0)
-    law = law_of(leg, "", settings.model_sigma)
     now = [
         JointCondition(
             joint=joint, fresh_m=3e-4, wear_m=0.0, limit_m=LIMIT_M, growth_m=float(growth[k]),
@@ -94,18 +91,9 @@ def ten_million(leg: Mechanism) -> None:
     coefficient_estimates = [estimate_coefficient(settings, 3e-4) for _ in now]
     for _ in range(2):  # the first makes the draws
         began = time.process_time()
-        found = forecast(now, coefficient_estimates, settings, law, cycle_s=1.0, valid=True)
+        found = forecast(now, coefficient_estimates, settings, cycle_s=1.0, valid=True)
     print(f"a forecast of all joints and the leg: {time.process_time() - began:.4f} s")
     print(f"A {found.joints[0].cycles}, leg {found.leg.cycles}")
-
-
-def law_of_growth(leg: Mechanism) -> None:
-    """The shipped law, and the deviation of each life from the law of the other lives."""
-    lives = read_lives(str(share_directory() / "config" / "lives" / "bionic_leg.json"), leg)
-    law = law_of(leg, "", Forecasting().model_sigma)
-    print(f"\nlaw of growth from {law.lives} lives: B\n{np.round(law.coupling, 2)}")
-    print(f"sigma {np.round(law.sigma, 3)}")
-    print(f"worst life, ln cycles: {np.round(np.abs(left_over(lives)).max(axis=0), 3)}")
 
 
 def main() -> None:
@@ -116,7 +104,6 @@ def main() -> None:
     if options.cycles:
         against_every_cycle(leg, options.cycles)
     ten_million(leg)
-    law_of_growth(leg)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,10 @@
 Wear coefficients, loads and clearances of the legs are hidden. A simulated life takes about twenty seconds;
 a joint that reaches its limit is held there, as if its part were replaced. The first life is the nominal one.
 
-The monitor has the growth law of the shipped lives. The truth is simulated lives that it has never seen, and
-200 legs by a law of a different form, fitted to those lives. Each leg is monitored for the first fifth of its
-own life (until its first joint ends), or for a fifth of a joint's own life. The forecast is then made without
-a measured clearance, with one of the joint (for the leg: of the joint that most likely ends first), and with
-all joints measured once.
+The truth is simulated lives, and 200 legs by a law that is fitted to those lives. Each leg is monitored for
+the first fifth of its own life (until its first joint ends), or for a fifth of a joint's own life. The
+forecast is then made without a measured clearance, with one of the joint (for the leg: of the joint that most
+likely ends first), and with all joints measured once.
 """
 
 import argparse
@@ -33,7 +32,6 @@ from leg_wear_monitor.monitor.forecast.forecast import (
     LegForecast,
     forecast,
 )
-from leg_wear_monitor.monitor.forecast.growth import GrowthLaw, law_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
 
 LIMIT_M = 6.0e-4
@@ -96,7 +94,7 @@ class Case:
 
 
 def terms(clearance: np.ndarray) -> np.ndarray:
-    """Terms for a linear model of the true ln growth: clearances and their squares, unlike the monitor's."""
+    """Terms for a linear model of the true ln growth: clearances and their squares."""
     x = clearance / FRESH_M - 1.0
     return np.concatenate([np.ones((len(x), 1)), x, x**2], axis=1)
 
@@ -164,28 +162,28 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
     return Case(state, clearance, (life.ends() - now) / later)
 
 
-def forecast_of(case: Case, law: GrowthLaw, measured: dict[int, ClearanceAtWear]) -> Forecast:
+def forecast_of(case: Case, measured: dict[int, ClearanceAtWear]) -> Forecast:
     coefficient_estimates = [
         estimate_coefficient(SETTINGS, FRESH_M, [measured[k]] if k in measured else [])
         for k in range(len(case.now))
     ]
-    return forecast(case.now, coefficient_estimates, SETTINGS, law, cycle_s=1.0, valid=True)
+    return forecast(case.now, coefficient_estimates, SETTINGS, cycle_s=1.0, valid=True)
 
 
-def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.ndarray:
+def evaluated(case: Case, random: np.random.Generator) -> np.ndarray:
     """p10, p50 and p90 over truth: (without, one, all) x (joints and the leg) x 3."""
     noise = MEASURED_M * random.standard_normal(len(case.now))
     observations = {
         k: ClearanceAtWear(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
         for k, each in enumerate(case.now)
     }
-    without = forecast_of(case, law, {})
-    singly = [forecast_of(case, law, {k: observation}) for k, observation in observations.items()]
+    without = forecast_of(case, {})
+    singly = [forecast_of(case, {k: observation}) for k, observation in observations.items()]
     first = [each.joint for each in case.now].index(str(without.leg.first))
     one = Forecast(joints=tuple(f.joints[k] for k, f in enumerate(singly)), leg=singly[first].leg)
     truth = np.append(case.remain, case.remain.min())
     rows: list[list[JointForecast | LegForecast]] = [
-        [*f.joints, f.leg] for f in (without, one, forecast_of(case, law, observations))
+        [*f.joints, f.leg] for f in (without, one, forecast_of(case, observations))
     ]
     bands = np.array([[attrs.astuple(each.cycles) for each in row] for row in rows])
     return np.asarray(bands / truth[:, None])
@@ -205,7 +203,7 @@ def row(name: str, ratio: np.ndarray) -> None:
     print(f"{name:>6}{cells}")
 
 
-def tables(name: str, lives: list[HiddenLife], twin: HiddenLife, law: GrowthLaw, again: int) -> None:
+def tables(name: str, lives: list[HiddenLife], twin: HiddenLife, again: int) -> None:
     joints, random = "ABGIJ", np.random.default_rng(7)
     head = f"{'':>6}" + "".join(f"{way:>20}{'':10}" for way in ("none", "one", "all measured"))
     print(f"\n{name}: {len(lives)} lives, {again} loads and noises each")
@@ -213,13 +211,13 @@ def tables(name: str, lives: list[HiddenLife], twin: HiddenLife, law: GrowthLaw,
         f"p10 to p90 holds the end [%], narrower by, p50 off [%], its bias; a fifth of the leg's life\n{head}"
     )
     cases = [case_of(v, 0.2 * v.ends().min(), twin, joints, random) for v in lives for _ in range(again)]
-    ratio = np.array([evaluated(case, law, random) for case in cases])
+    ratio = np.array([evaluated(case, random) for case in cases])
     for k, joint in enumerate([*joints, "leg"]):
         row(joint, ratio[:, :, k])
     print("a fifth of the joint's own life")
     for k, joint in enumerate(joints):
         cases = [case_of(v, 0.2 * v.ends()[k], twin, joints, random) for v in lives for _ in range(again)]
-        row(joint, np.array([evaluated(case, law, random)[:, k] for case in cases]))
+        row(joint, np.array([evaluated(case, random)[:, k] for case in cases]))
 
 
 def simulate(leg: Mechanism, path: Path, seconds: float) -> None:
@@ -245,11 +243,9 @@ def main() -> None:
     if options.simulate:
         simulate(leg, options.lives, options.simulate)
         return
-    law = law_of(leg, "", SETTINGS.model_sigma)
-    print(f"the monitor's law: {law.lives} lives, sigma {np.round(law.sigma, 3)}")
     twin, *hidden = read(options.lives)
-    tables("simulated", hidden, twin, law, -(-options.legs // len(hidden)))
-    tables("by a law", truth_by_law(hidden, options.legs, np.random.default_rng(8)), twin, law, 1)
+    tables("simulated", hidden, twin, -(-options.legs // len(hidden)))
+    tables("by a law", truth_by_law(hidden, options.legs, np.random.default_rng(8)), twin, 1)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,6 @@ _LOAD = "number", "Pa m/s", "Mean of pressure times sliding speed when new."
 def life() -> Iterator[Row]:
     texts = descriptions(lw.Life)
     yield "mechanism", "text", "", "Name of the mechanism."
-    yield "fingerprint", "text", "", "Checksum of the mechanism; a forecast refuses the lives of another leg."
     yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
     counted = "Whether its wear is counted; false for a pair without wear coefficient, whose clearance stays."
     yield "validity.<joint>.is_counted", "true or false", "", counted
@@ -50,8 +49,8 @@ def life() -> Iterator[Row]:
     yield VERSION
     for name in ("cycles", "error_m"):
         yield name, "list of numbers", unit_of(name), texts[name]
-    further = ("clearance_m", "growth_m_per_cycle")
-    for name in (*further, "clearance_max_m", "worst_sector_deg", "peak_force_n"):
+    columns = "clearance_m", "growth_m_per_cycle", "clearance_max_m", "worst_sector_deg", "peak_force_n"
+    for name in columns:
         yield f"joints.<joint>.{name}", "list of numbers", unit_of(name), texts[name]
     name = "part_growth_m_per_cycle"
     words = f"{texts[name].removesuffix('.')}, load by load; with a duty only."
@@ -66,12 +65,6 @@ def life() -> Iterator[Row]:
         ("days", "d", "The same in days of this duty."),
     ):
         yield f"duty.end.<joint>.{name}", "number or null", unit, words
-    yield "wear_factor.<joint>", "number", "", "Factor on the wear coefficients of this life."
-    yield "further[]", "object", "", "Lives with other wear coefficients, in short."
-    yield "further[].wear_factor.<joint>", "number", "", "As above."
-    yield "further[].cycles", "list of numbers", unit_of("cycles"), texts["cycles"]
-    for name in further:
-        yield f"further[].joints.<joint>.{name}", "list of numbers", unit_of(name), texts[name]
 
 
 def commissioning() -> Iterator[Row]:

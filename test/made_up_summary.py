@@ -86,7 +86,7 @@ def made_up_state() -> LegState:
 def made_up_summary() -> ReplaySummary:
     """Joint A as encoders show it and with a forecast; joint B with neither."""
     forecast = JointForecast(
-        answer=Answer.KNOWN, cycles=LIFE, hours=LIFE, days=None, clearance_m=LIFE, measurements=1,
+        answer=Answer.KNOWN, cycles=LIFE, hours=LIFE, clearance_m=LIFE, measurements=1,
         prior=CoefficientPrior(sigma=0.7, basis="a judgement", holds_for="steel on steel (greased)"),
     )  # fmt: skip
     joint = ReplayJoint(
@@ -117,7 +117,7 @@ def made_up_summary() -> ReplaySummary:
         monitor=ReplayMonitor(
             mechanism="leg", hardware_id="leg 1", clearance_joints=("A", "B"), commanded_rpm=60.0,
             wear_acceleration=1.0, bushing_radius_m={"A": 0.01, "B": 0.01},
-            limits=Limits(joint_clearance_m=(5e-4, 6e-4)), duty_hours_per_day=8.0,
+            limits=Limits(joint_clearance_m=(5e-4, 6e-4)),
         ),
         leg=ReplayLeg(
             bodies_m={"thigh": ((0.0, 0.0), (0.0, -0.4)), "shank": ((0.0, -0.4), (0.1, -0.8), (-0.1, -0.8))},
@@ -132,8 +132,7 @@ def made_up_summary() -> ReplaySummary:
         gait=ReplayGait(believable_cycles=2, doubtful_cycles=0, missing="", is_counted=False),
         joints={"A": joint, "B": attrs.evolve(joint, forecast=None, encoders=None, peak_force_n=math.inf)},
         forecast=LegForecast(
-            answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, days=LIFE, first_probability={"A": 1.0},
-            simulated_lives=0, first="A",
+            answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, first_probability={"A": 1.0},
         ),
         measurements=(Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, 0.2, True, id=3),),
         walked=(WalkedLoad(300, 2, 2.0, 290.0, 5.0),),

@@ -101,7 +101,6 @@ def unknown_leg() -> LegSetup:
         wear_acceleration=1.0,
         bushing_radius_m={},
         limits=default.limits,
-        duty_hours_per_day=default.forecast.duty_hours_per_day,
     )
     return LegSetup(monitor, ReplayLeg())
 

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, ModelError, growth_rate, model_error
+from leg_wear_monitor.monitor.forecast.growth import ModelError, model_error
 from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import ClearanceEstimate, CycleReport, JointReport
@@ -162,7 +162,7 @@ class WearModel:
         seen: ClearanceEstimate | None,
         estimate: KnownClearance | None,
     ) -> JointReport:
-        joint, rate = self.clearance_joints[k], growth_rate(self.forecaster.growth[k].last(GROWTH_CYCLES))
+        joint, rate = self.clearance_joints[k], self.forecaster.last_rate(k)
         mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
         rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
         error_m = rate.error_m(self.model_error.relative(k, rate.per_cycle_m)) if rate else None

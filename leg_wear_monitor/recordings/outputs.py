@@ -204,5 +204,4 @@ def _leg_lifetime(forecast: LegForecast) -> Status:
     """Life until the first joint reaches its limit, and each joint's probability of being the first."""
     values = lifetime_values(forecast)
     values |= {f"{joint}_first_probability": value for joint, value in forecast.first_probability.items()}
-    values["simulated_lives"] = float(forecast.simulated_lives)
     return Status("forecast leg", Level.OK, forecast.answer.value, values)

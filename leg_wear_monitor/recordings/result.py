@@ -249,8 +249,6 @@ class ReplayMonitor:
         Radius of the bushing.
     limits : Limits
         Limits of the alarms.
-    duty_hours_per_day : float
-        Usual walking a day.
     """
 
     mechanism: str
@@ -260,7 +258,6 @@ class ReplayMonitor:
     wear_acceleration: float
     bushing_radius_m: dict[str, float]
     limits: Limits
-    duty_hours_per_day: float
 
 
 @attrs.frozen(kw_only=True)

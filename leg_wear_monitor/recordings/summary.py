@@ -135,8 +135,8 @@ def _valid(forecast: _Forecast | None, verdict: Verdict) -> _Forecast | None:
     if forecast is None or Figure.FORECAST not in verdict.not_valid:
         return forecast
     is_joint = isinstance(forecast, JointForecast)
-    unknown: dict[str, Any] = {"clearance_m": None} if is_joint else {"first_probability": {}, "first": None}
-    return attrs.evolve(forecast, cycles=None, hours=None, days=None, **unknown)
+    unknown: dict[str, Any] = {"clearance_m": None} if is_joint else {"first_probability": {}}
+    return attrs.evolve(forecast, cycles=None, hours=None, **unknown)
 
 
 # The summary of a replay, the source of its files and its page.
@@ -291,7 +291,6 @@ def settings_of(config: MonitorConfig, mechanism: Mechanism) -> ReplayMonitor:
         wear_acceleration=config.wear_acceleration,
         bushing_radius_m={joint: mechanism.clearances[joint].bushing_radius for joint in joints},
         limits=config.limits,
-        duty_hours_per_day=config.forecast.duty_hours_per_day,
     )
 
 

@@ -21,7 +21,6 @@ from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.forecast.growth import life_doubts
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports, Status
@@ -267,7 +266,7 @@ class MonitorNode(ClosingNode):
         rpm = f"{config.cadence.commanded_rpm:g} rpm"
         self.get_logger().info(f"monitoring joints {joints} of {leg} at {rpm}, hardware {config.hardware}")
         found = doubts(load_mechanism(config.mechanism)), parameter_doubts(config, mechanism)
-        for doubt in chain(*found, life_doubts(config, mechanism), self._monitor.coefficient_doubts):
+        for doubt in chain(*found, self._monitor.coefficient_doubts):
             self.get_logger().warning(str(doubt))
 
     @property

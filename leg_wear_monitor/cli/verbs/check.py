@@ -163,14 +163,13 @@ def _parameters(path: str, node: str | None = None) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts, twin_settings
     from leg_wear_monitor.monitor.config.parameters import load_config
-    from leg_wear_monitor.monitor.forecast.growth import life_doubts
 
     config = load_config(path, node)
     if node:
         config = config.on_node(node)
     leg = fitted(load_mechanism(config.mechanism), config, path)
     twin_settings(config, path)
-    common.warn_of(path, (*parameter_doubts(config, leg), *life_doubts(config, leg)))
+    common.warn_of(path, parameter_doubts(config, leg))
     text = (
         f"parameters of the monitor: {config.mechanism}, clearance joints {', '.join(leg.clearance_joints)}, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"

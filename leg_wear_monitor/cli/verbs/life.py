@@ -12,10 +12,7 @@ from leg_wear_monitor.files import json_text
 if TYPE_CHECKING:
     from leg_wear_monitor.life.design import BushingLife
     from leg_wear_monitor.life.result import Life
-    from leg_wear_monitor.mechanism.arrays import Floats
     from leg_wear_monitor.mechanism.spec import Mechanism
-
-    Lives = list[tuple[Floats, Life]]  # factors on the joints' wear coefficients, and the life with them
 
 # ``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps.
 
@@ -40,13 +37,6 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.positive("--max-wear-per-jump-m", "M", "Deepest change of a surface in a jump [m].  [default: 3e-05]")
 @common.count("--legs", "N", "Number of legs averaged.  [default: 2]")
 @common.option("--cycles", "N", "Gait cycles averaged per leg.  [default: 4]", type=click.IntRange(min=2))
-@common.count(
-    "--ensemble-size",
-    "N",
-    "Number of lives for --json. Lives after the first have different wear coefficients; they show the "
-    "forecast how joints affect each other.",
-    default=1,
-)
 @common.json_option("the life")
 @common.out_option("Write life.json and life.png.")
 def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
@@ -61,10 +51,10 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     leg = common.with_clearance_joints(load_mechanism(mechanism), names)
     common.check_outputs(json_file, out)
     with common.options_named():
-        lives = _lives(leg, **options)
+        result = _life(leg, **options)
     # only after success, because the message of a failure contains the doubts
     common.warn_of(leg.source, doubts(leg))
-    result, document = lives[0][1], _document(leg, lives, limit_m)
+    document = _document(leg, result, limit_m)
     text = json_text(document)
     written = common.write_json(json_file, text)
     if out is not None:
@@ -75,12 +65,12 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     common.say(json_file, life_lines(result, limit_m, document["validity"]), written)
 
 
-def _lives(leg: "Mechanism", ensemble_size: int, duty: str | None, **options: Any) -> "Lives":
-    """Check the options, and simulate the lives."""
+def _life(leg: "Mechanism", duty: str | None, wear_factor: float, **options: Any) -> "Life":
+    """Check the options, and simulate the life."""
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.life import LifeSettings, check_life, simulate_lives
+    from leg_wear_monitor.life.life import LifeRun, LifeSettings, check_life, simulate_life
     from leg_wear_monitor.life.result import Duty
     from leg_wear_monitor.mechanism.materials import check_wear_is_known
 
@@ -96,20 +86,19 @@ def _lives(leg: "Mechanism", ensemble_size: int, duty: str | None, **options: An
     clearance_m, radius_m = sizes.reshape(-1, 2).T
     check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.max_wear_per_jump_m)
     with common.compilation(), common.progress_bar("life") as progress:
-        return list(simulate_lives(leg, settings, ensemble_size, progress=progress, duty=loads, **options))
+        run = LifeRun(leg, settings, speed_rpm=options.pop("speed_rpm"), wear_factor=wear_factor, duty=loads)
+        return simulate_life(run, progress=progress, **options)
 
 
-def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any]:
-    """Content of the JSON file: the lives, and the fingerprint of the leg that they belong to."""
-    from leg_wear_monitor.life.life import lives_document
+def _document(leg: "Mechanism", result: "Life", limit_m: float) -> dict[str, Any]:
+    """Content of the JSON file: the life, and the leg that it belongs to."""
+    from leg_wear_monitor.life.life import life_document
     from leg_wear_monitor.life.result import validity
-    from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
     return {
         "mechanism": leg.name,
-        "fingerprint": fingerprint(leg),
-        "validity": validity(leg, lives[0][1]),
-        **lives_document(lives, limit_m),
+        "validity": validity(leg, result),
+        **life_document(result, limit_m),
     }
 
 

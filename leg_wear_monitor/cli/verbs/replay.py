@@ -108,13 +108,12 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted, parameter_doubts
     from leg_wear_monitor.monitor.config.parameters import load_config
-    from leg_wear_monitor.monitor.forecast.growth import life_doubts
 
     config, source = load_config(path, node), str(path or "parameters")
     mechanism = load_mechanism(config.mechanism)
     leg = fitted(mechanism, config, source)
     common.warn_of(leg.source, doubts(mechanism))
-    common.warn_of(source, (*parameter_doubts(config, leg), *life_doubts(config, leg)))
+    common.warn_of(source, parameter_doubts(config, leg))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
 
 

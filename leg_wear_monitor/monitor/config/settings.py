@@ -137,19 +137,12 @@ class Forecasting:
     """
 
     load_sigma: float = 0.1  # spread of future wear per cycle, because load and pace vary
-    # spread of the growth without simulated lives, and beyond their end (forecast.md)
+    # departure of the growth until the limit from the rise that `cycles_to` assumes: simulated lives had less
     model_sigma: float = 0.4
     # spread of a new joint's clearance as a fraction of it: the limits of a running fit are ± 20 % of its
     # mean
     new_clearance_sigma: float = 0.1
-    duty_hours_per_day: float = quantity("h", "walking per day", within=(0.01, 24.0), default=8.0)
-    duty_sigma: float = 0.2  # spread of the walking per day
     window_cycles: int = 2000  # over which growth is averaged, because single gait cycles scatter
-    growth_law_file: str = described(
-        "file that `leg-wear-monitor life --ensemble-size 16 --json` wrote for this leg: how growth changes "
-        "as all clearances open. Empty: use the file that the package has for this leg",
-        default="",
-    )
 
 
 @attrs.frozen(kw_only=True)

@@ -1,1 +1,1 @@
-"""Remaining life: growth law, wear coefficients, measurements, forecast."""
+"""Remaining life: growth, wear coefficients, measurements, forecast."""

@@ -1,8 +1,7 @@
 """Remaining life of the joints and the leg, with its uncertainty: a distribution over all unknown quantities.
 
 An ensemble of legs samples every joint's wear coefficient and clearance, the growth's own scatter and the
-future load. In each leg all joints grow together by the law of growth, until each has reached its limit
-(`GrowthLaw`, `cycles_to`).
+future load. In each leg all joints grow together until each has reached its limit (`cycles_to`).
 """
 
 import math
@@ -16,10 +15,6 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import Forecasting
-from leg_wear_monitor.monitor.forecast.growth import (
-    GrowthLaw,
-    cycles_to,
-)
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     CoefficientPrior,
@@ -38,9 +33,8 @@ def even_fractions(dimensions: int) -> Floats:
     """Numbers in (0, 1), shape (dimensions, MEMBERS): a lattice of Korobov's.
 
     Each dimension has the same evenly spaced numbers, in a different order. With this multiplier every two of
-    17 dimensions, which five joints need, are filled like a good two-dimensional lattice: lines that hold all
-    members are at most 1/15 apart, where 1/34 is the least that could be; of 32 dimensions 1/6 (see the
-    test).
+    16 dimensions, which five joints need, are filled like a good two-dimensional lattice: lines that hold all
+    members are at most 1/15 apart, where 1/34 is the least that could be.
     """
     member = np.arange(MEMBERS)
     rows = [
@@ -103,8 +97,6 @@ class JointForecast:
         Gait cycles until the mean clearance reaches its limit; None unless known (0 at the limit).
     hours : Quantiles or None
         Hours of walking until then.
-    days : Quantiles or None
-        Days at the usual duty until then.
     clearance_m : Quantiles or None
         The present clearance, as far as it is known; None if the verdict marks it as not valid.
     measurements : int
@@ -117,7 +109,6 @@ class JointForecast:
     answer: Answer
     cycles: Quantiles | None
     hours: Quantiles | None
-    days: Quantiles | None
     clearance_m: Quantiles | None
     measurements: int
     prior: CoefficientPrior | None = None
@@ -140,26 +131,18 @@ class LegForecast:
         Gait cycles; None unless known.
     hours : Quantiles or None
         Hours of walking; None unless known.
-    days : Quantiles or None
-        Days at the usual duty; None unless known.
     first_probability : dict of str to float
         Probability that this joint is the first; empty unless known.
-    simulated_lives : int
-        Number of simulated lives, which show the effect of joints on each other.
-    first : str or None
-        The joint that is most likely the first.
     """
 
     answer: Answer
     cycles: Quantiles | None
     hours: Quantiles | None
-    days: Quantiles | None
     first_probability: dict[str, float]
-    simulated_lives: int
-    first: str | None = attrs.field()
 
-    @first.default
-    def _first(self) -> str | None:
+    @property
+    def first(self) -> str | None:
+        """The joint that is most likely the first."""
         return max(self.first_probability, key=lambda j: self.first_probability[j], default=None)
 
 
@@ -215,7 +198,6 @@ def forecast(
     now: Sequence[JointCondition],
     estimates: Sequence[CoefficientEstimate],
     settings: Forecasting,
-    law: GrowthLaw,
     *,
     cycle_s: float,
     valid: bool,
@@ -228,56 +210,39 @@ def forecast(
     estimates : sequence of CoefficientEstimate
         Of their wear coefficients.
     settings : Forecasting
-    law : GrowthLaw
-        Of the same joints in the same order.
     cycle_s : float
         Time of a gait cycle.
     valid : bool
         True if the model is valid for the present operation of the leg.
     """
-    clearance_m, base_m, duty_h = _legs(now, estimates, settings, law)
+    clearance_m, growth_m = _legs(now, estimates, settings)
     clearances = [quantiles(row) for row in clearance_m]
     answers = [each.answer(q.p50, valid) for each, q in zip(now, clearances, strict=True)]
-    limit = np.array([each.limit_m for each in now])
-    ended = np.array([[answer is Answer.AT_LIMIT] for answer in answers])
-    ends = cycles_to(law, np.where(ended, limit[:, None], clearance_m), base_m, limit)
-    day = cycle_s / 3600.0 / duty_h
+    fresh_m, limit_m = (np.array([[getattr(each, name)] for each in now]) for name in ("fresh_m", "limit_m"))
+    ends = cycles_to(limit_m, clearance_m, growth_m, fresh_m)
+    ends[[answer is Answer.AT_LIMIT for answer in answers]] = 0.0
     joints = tuple(
         JointForecast(
-            answer=a,
-            **_life(a, end, cycle_s, day),
-            clearance_m=q,
-            measurements=one.observations,
-            prior=one.prior,
+            answer=a, **_life(a, end, cycle_s), clearance_m=q, measurements=one.observations, prior=one.prior
         )
         for a, end, q, one in zip(answers, ends, clearances, estimates, strict=True)
     )
     answer = _leg_answer(answers)
     # a joint of no or of unknown growth does not end the leg, though its clearance may be at the limit
     ends[[each in (*_NOT_KNOWN, Answer.NO_GROWTH) for each in answers]] = np.inf
-    life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
+    life, first = _life(answer, ends.min(axis=0), cycle_s), {}
     if life["cycles"] is not None:
         fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
         first = {each.joint: float(p) for each, p in zip(now, fraction, strict=True)}
-    leg = LegForecast(
-        answer=answer, cycles=life["cycles"], hours=life["hours"], days=life["days"],
-        first_probability=first, simulated_lives=law.lives,
-    )  # fmt: skip
-    return Forecast(joints=joints, leg=leg)
+    return Forecast(joints=joints, leg=LegForecast(answer=answer, **life, first_probability=first))
 
 
 def _legs(
-    now: Sequence[JointCondition],
-    estimates: Sequence[CoefficientEstimate],
-    settings: Forecasting,
-    law: GrowthLaw,
-) -> tuple[Floats, Floats, Floats]:
-    """The ensemble of n legs that might be this one.
-
-    Clearances (k, n) now, growth (k, n) a gait cycle when all was new, and hours (n,) of walking a day.
-    """
+    now: Sequence[JointCondition], estimates: Sequence[CoefficientEstimate], settings: Forecasting
+) -> tuple[Floats, Floats]:
+    """Clearances and growth per gait cycle (k, n) of the ensemble of n legs that might be this one."""
     k = len(now)
-    fractions, normals = even_fractions(3 * k + 2), even_normals(3 * k + 2)
+    fractions, normals = even_fractions(3 * k + 1), even_normals(3 * k + 1)
     log_factor = np.array([one.log_factors(row) for one, row in zip(estimates, fractions, strict=False)])
     excess = np.array(
         [
@@ -285,33 +250,57 @@ def _legs(
             for own, one, row in zip(log_factor, estimates, normals[k:], strict=False)
         ]
     )
-    fresh, wear, growth, error, limit = (
+    wear, growth, error = (
         np.array([[getattr(each, name) or 0.0] for each in now])
-        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m", "limit_m")
+        for name in ("wear_m", "growth_m", "growth_error_m")
     )
     known, before = (
         np.array([[getattr(each.known, name)] for each in estimates]) for name in ("clearance_m", "wear_m")
     )
     clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
-    sigma = law.sigma_to(limit[:, 0], settings.model_sigma)[:, None]
-    log_rate = log_factor + np.hypot(sigma, relative) * normals[2 * k : 3 * k]
+    log_rate = log_factor + np.hypot(settings.model_sigma, relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]
-    # The twin's growth belongs to its own clearances. The estimate of a factor is a mean over the life of the
-    # part. During this time, the other clearances gradually departed from the twin's, so the estimate
-    # contains half of their effect.
-    here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
-    log_base = log_rate + 0.5 * (here - twin) - here
-    duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
-    return clearance, np.maximum(growth, 0.0) * np.exp(log_base), np.minimum(duty, 24.0)
+    return clearance, np.maximum(growth, 0.0) * np.exp(log_rate)
 
 
-def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:
-    """Remaining life in cycles, hours and days; ``day`` (n,) is the length of a cycle in days."""
+def cycles_to(limit_m: Floats, clearance_m: Floats, growth_m: Floats, fresh_m: Floats) -> Floats:
+    """Gait cycles (k, n) until each joint reaches its limit, all joints growing together.
+
+    The wider the joints are, the harder all of them knock: the growth of each joint is in proportion to the
+    mean of all clearances, each relative to its clearance when new. In the lives of the default leg, doubled
+    clearances multiply the growth of a joint by 1.3 to 2.8. A joint at its limit stays there.
+
+    Parameters
+    ----------
+    limit_m, fresh_m : (k, 1) arrays
+    clearance_m, growth_m : (k, n) arrays
+        Now, of n legs; growth per gait cycle.
+
+    Returns
+    -------
+    (k, n) array
+        Infinite where a clearance does not grow; 0 where it is at its limit.
+    """
+    way_m, grows = np.maximum(limit_m - clearance_m, 0.0), growth_m > 0.0
+    # cycles at the present growth; they pass faster by the factor of the growth, which is linear between them
+    even = np.divide(way_m, growth_m, out=np.zeros_like(way_m), where=grows)
+    knots = np.concatenate([np.zeros((1, even.shape[1])), np.sort(even, axis=0)])
+    opened_m = np.minimum(np.where(grows, growth_m, 0.0) * knots[:, None], way_m)
+    factor = ((clearance_m + opened_m) / fresh_m).mean(axis=1)
+    factor /= factor[0]
+    rise = np.diff(factor, axis=0)
+    pace = np.divide(np.diff(np.log(factor), axis=0), rise, out=1.0 / factor[1:], where=rise > 0.0)
+    cycles = np.cumsum(np.diff(knots, axis=0) * pace, axis=0)
+    ends = np.take_along_axis(cycles, even.argsort(axis=0).argsort(axis=0), axis=0)
+    return np.where(grows | (way_m == 0.0), ends, np.inf)
+
+
+def _life(answer: Answer, cycles: Floats, cycle_s: float) -> dict[str, Quantiles | None]:
+    """Remaining life in cycles and hours."""
     if answer not in (Answer.KNOWN, Answer.PARTLY_KNOWN, Answer.AT_LIMIT):
-        return dict.fromkeys(("cycles", "hours", "days"))
-    hours = cycles * (cycle_s / 3600.0)
-    return {"cycles": quantiles(cycles), "hours": quantiles(hours), "days": quantiles(cycles * day)}
+        return dict.fromkeys(("cycles", "hours"))
+    return {"cycles": quantiles(cycles), "hours": quantiles(cycles * (cycle_s / 3600.0))}
 
 
 _NOT_KNOWN = (Answer.NOT_ENOUGH_DATA, Answer.NO_COEFFICIENT)
@@ -335,16 +324,14 @@ def quantiles(values: Floats) -> Quantiles:
 # How long something lasts, and how large a clearance is, in as many digits as are known.
 
 
-UNKNOWN = {
-    f"{fraction}_{key}": math.nan for key in ("cycles", "hours", "days") for fraction in ("p10", "p50", "p90")
-}
+UNKNOWN = {f"{fraction}_{key}": math.nan for key in ("cycles", "hours") for fraction in ("p10", "p50", "p90")}
 """Result of `lifetime_values` if nothing is known."""
 
 
 def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
-    """Quantiles of cycles, hours and days of duty by keys such as ``p50_hours``; none if not known."""
+    """Quantiles of cycles and hours by keys such as ``p50_hours``; none if not known."""
     values: dict[str, float] = {}
-    for key in ("cycles", "hours", "days"):
+    for key in ("cycles", "hours"):
         quantiles = getattr(forecast, key)
         if quantiles is not None:
             values |= {f"{fraction}_{key}": value for fraction, value in attrs.asdict(quantiles).items()}

@@ -15,13 +15,7 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.growth import (
-    GrowthRate,
-    GrowthWindow,
-    ModelError,
-    growth_rate,
-    law_of,
-)
+from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, GrowthRate, ModelError, growth_rate
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientEstimate,
@@ -224,15 +218,9 @@ class Forecaster:
 
     Attributes
     ----------
-    growth : tuple of GrowthWindow
     coefficient_estimates : tuple of CoefficientEstimate
     measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
         Of the ledger, and since.
-
-    Raises
-    ------
-    ConfigError
-        For a file of lives that cannot be used.
     """
 
     def __init__(
@@ -246,8 +234,8 @@ class Forecaster:
         self._settings, self._clearance_joints = settings, mechanism.clearance_joints
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
-        self._law = law_of(mechanism, settings.growth_law_file, settings.model_sigma)
-        self.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
+        # growth of each joint's clearance, and time in motion (2, n), of the last gait cycles of its part
+        self._cycles: tuple[Floats, ...] = (np.zeros((2, 0)),) * len(self._fresh_m)
         self.measurements, self.corrections = tuple(measurements), tuple(corrections)
         self._last: Forecast | None = None  # None before the first, and when something is new
         self._stamp_ns, self._known = 0, 0  # stamp of the last forecast; joints whose growth was known then
@@ -277,12 +265,13 @@ class Forecaster:
         model : ModelError
             Error of the growth because of the load.
         """
-        joints = zip(self.growth, statistics.growth_mean_m.tolist(), strict=True)
-        cycles, moving_s = self._settings.window_cycles, statistics.moving_s
-        self.growth = tuple(window.extended(growth_m, moving_s, cycles) for window, growth_m in joints)
+        longest, moving_s = self._settings.window_cycles, statistics.moving_s
+        self._cycles = tuple(
+            np.column_stack([cycles, [growth_m, moving_s]])[:, -longest:]
+            for cycles, growth_m in zip(self._cycles, statistics.growth_mean_m.tolist(), strict=True)
+        )
         is_recent = 0 <= statistics.stamp_ns - self._stamp_ns < RENEWED_NS
-        rates = [growth_rate(window) for window in self.growth]
-        if self._last is None or not is_recent or _known(rates) > self._known:
+        if self._last is None or not is_recent or _known(self._rates) > self._known:
             self._stamp_ns = statistics.stamp_ns
             return self.renewed(wear_m, limits_m, is_valid(), model)
         return self._last
@@ -295,7 +284,7 @@ class Forecaster:
         model: ModelError,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
-        rates = [growth_rate(window) for window in self.growth]
+        rates = self._rates
         self._known = _known(rates)
         now = [
             JointCondition(
@@ -309,17 +298,25 @@ class Forecaster:
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]
-        # the window of a new part is shorter than the windows of the other joints
-        walked = max((window.moving_s for window in self.growth), key=len)
+        # a new part has fewer gait cycles than the parts of the other joints
+        moving_s = max((moving_s for _, moving_s in self._cycles), key=len)
         self._last = forecast(
             now,
             self.coefficient_estimates,
             self._settings,
-            self._law,
-            cycle_s=float(np.mean(walked)),
+            cycle_s=float(np.mean(moving_s)),
             valid=is_valid,
         )
         return self._last
+
+    @property
+    def _rates(self) -> list[GrowthRate | None]:
+        """Growth of each joint's clearance over its window; None while there is not enough data."""
+        return [growth_rate(*cycles) for cycles in self._cycles]
+
+    def last_rate(self, k: int) -> GrowthRate | None:
+        """Growth of the clearance of joint k over the last gait cycles; None without enough data."""
+        return growth_rate(*self._cycles[k][:, -GROWTH_CYCLES:])
 
     def expire(self) -> None:
         """Make a new forecast after the next gait cycle, because its inputs have changed."""
@@ -338,7 +335,7 @@ class Forecaster:
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Forget the growth of a joint, and estimate its coefficient from all that is known of its part."""
-        self.growth = _with(self.growth, self._clearance_joints.index(joint), GrowthWindow())
+        self._cycles = _with(self._cycles, self._clearance_joints.index(joint), np.zeros((2, 0)))
         self.estimate_anew(joint, replaced_ns)
 
     def estimate_anew(self, joint: str, replaced_ns: int) -> None:

@@ -50,13 +50,12 @@ def _table(summary: ReplaySummary) -> Table:
         ))  # fmt: skip
     if leg is not None:
         rows.append(("leg", "", *_lasts(leg), "", leg.answer.value))
-    quantiles = [f"{fraction} [{unit}]" for unit in ("h", "days") for fraction in FRACTIONS]
+    quantiles = [f"{fraction} [h]" for fraction in FRACTIONS]
     return Table(
-        caption="Hours of walking, and days of duty, until the limit of the mean clearance",
+        caption="Hours of walking until the limit of the mean clearance",
         head=("", "clearance [mm]", *quantiles, "first [%]", ""),
         rows=rows,
         note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
-        f"A day of duty has {summary.monitor.duty_hours_per_day:g} h of walking. "
         "Clearance: p10 to p90 of the present clearance. First: probability that this joint is the first "
         "at its limit, which ends the life of the leg.",
     )
@@ -68,11 +67,8 @@ def _forecasts(summary: ReplaySummary) -> list[tuple[str, JointForecast]]:
 
 
 def _lasts(forecast: JointForecast | LegForecast) -> list[str]:
-    return [
-        three_digits(getattr(unit, fraction)) if unit else "-"
-        for unit in (forecast.hours, forecast.days)
-        for fraction in FRACTIONS
-    ]
+    hours = forecast.hours
+    return [three_digits(getattr(hours, fraction)) if hours else "-" for fraction in FRACTIONS]
 
 
 def leg_sentence(summary: ReplaySummary) -> list[str]:
@@ -80,10 +76,7 @@ def leg_sentence(summary: ReplaySummary) -> list[str]:
     leg = summary.forecast
     if leg is None or leg.hours is None or leg.first is None or not_valid(summary.verdict, Figure.FORECAST):
         return []
-    lasts = []
-    for fraction in FRACTIONS:
-        days = f" or {three_digits(getattr(leg.days, fraction))} days" if leg.days else ""
-        lasts.append(f"{three_digits(getattr(leg.hours, fraction))} hours of walking{days}")
+    lasts = [f"{hours} hours of walking" for hours in _lasts(leg)]
     first, probability = summary.leg.joint_words(leg.first), 100.0 * leg.first_probability[leg.first]
     return [
         f"The leg lasts {lasts[1]} (p10 {lasts[0]}, p90 {lasts[2]}); {first} is the first joint at its "

@@ -88,19 +88,18 @@ class TorqueWatch(Observer):
     def _new_observer(self) -> TorqueObserver:
         """The estimator, with the data of files and ledger on this leg."""
         leg, ledger, path = self._leg, self._leg.ledger, self._leg.config.diagnosis.reference
+        # after a change of the order of the bodies in the mechanism file, both are estimated again
+        order = tuple(leg.mechanism.bodies)
         known = ledger.parameters if ledger else None
-        kept = ledger.references if ledger else ()
+        kept = [one.reference for one in (ledger.references if ledger else ()) if one.bodies == order]
         return TorqueObserver(
             leg.mechanism,
             leg.config,
             leg.twin.torque_size_nm,
             leg.twin.clearance_mean_m,
             ledger.commissioned_torques if ledger else (),
-            known.parameters.of_bodies(known.bodies, leg.mechanism) if known else None,
-            (
-                *(read_references(Path(path), leg.mechanism) if path else ()),
-                *(one.reference.in_order_of(leg.mechanism, one.bodies) for one in kept),
-            ),
+            known.parameters if known and known.bodies == order else None,
+            (*(read_references(Path(path), leg.mechanism) if path else ()), *kept),
         )
 
     def configure(self, config: MonitorConfig) -> None:

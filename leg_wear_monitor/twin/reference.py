@@ -90,11 +90,6 @@ class LegParameters:
         coefficients = [self.friction * one.friction.coefficient for one in mechanism.clearances.values()]
         return is_near and self.friction > 0.0 and all(one <= _MOST_COEFFICIENT for one in coefficients)
 
-    def of_bodies(self, names: Sequence[str], mechanism: Mechanism) -> "LegParameters":
-        """The same factors, reordered from the given order of bodies to the order of the mechanism."""
-        order = [names.index(name) for name in mechanism.bodies]
-        return attrs.evolve(self, mass=self.mass[order], length=self.length[order])
-
     def applied(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism with these factors; the compliance is not part of the mechanism."""
         bodies = {}

@@ -119,22 +119,6 @@ class TorqueReference:
         """Indices (k, sizes) of legs with a changed clearance of a joint."""
         return np.arange(1, len(self.clearance_m) - self._of_factors).reshape(self.clearance_m.shape[1], -1)
 
-    def in_order_of(self, mechanism: Mechanism, names: Sequence[str]) -> "TorqueReference":
-        """The same reference with bodies in the order of a mechanism, instead of the order of their names.
-
-        If the orders differ, an unfinished reference drops its legs with changed bodies, except the expected
-        leg.
-        """
-        parameters = self.parameters.of_bodies(names, mechanism)
-        order = [names.index(name) for name in mechanism.bodies]
-        if order == sorted(order):
-            return attrs.evolve(self, parameters=parameters)
-        legs = [0] if self.is_of_parameters else [0, *self.of_joints.flat]
-        if self.is_whole and self._of_factors:
-            legs += [*self.of_masses[order].flat, *self.of_frictions.flat]
-        torque_nm = tuple(self.torque_nm[leg] for leg in legs if leg < len(self.torque_nm))
-        return attrs.evolve(self, parameters=parameters, torque_nm=torque_nm)
-
     @property
     def angle(self) -> Floats:
         """Crank angle (POINTS + 1,) [rad] between the steps, from the profile's angle 0 on."""

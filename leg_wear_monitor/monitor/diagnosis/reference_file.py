@@ -141,7 +141,7 @@ def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, 
             str(path),
             "",
             f"has torque references of a different leg ({printable(name, 60)}). Expected those of "
-            f"{mechanism.name} with its bodies, lengths, clearance joints and clearances",
+            f"{mechanism.name} with its bodies, lengths, clearance joints and clearances, in the same order",
         )
     return found
 
@@ -156,12 +156,12 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
             if number != FORMAT:
                 raise ValueError(f"format {number}. Expected {FORMAT}")
             name, joints = str(parts["mechanism"]), tuple(parts["joints"].tolist())
-            # clearances are in the order of the joints, which the fingerprint leaves open
-            if str(parts["fingerprint"]) != fingerprint(mechanism) or joints != mechanism.clearance_joints:
+            # the fingerprint leaves open the order of joints and bodies, in which clearances and masses are
+            order, bodies = (mechanism.clearance_joints, tuple(mechanism.bodies)), parts["bodies"].tolist()
+            if str(parts["fingerprint"]) != fingerprint(mechanism) or (joints, tuple(bodies)) != order:
                 return (), name
-            names, references = parts["bodies"].tolist(), range(int(parts["references"]))
-            read = (_reference(parts, i, len(names), len(joints)) for i in references)
-            found = tuple(one.in_order_of(mechanism, names) for one in read)
+            references = range(int(parts["references"]))
+            found = tuple(_reference(parts, i, len(bodies), len(joints)) for i in references)
             if not found:
                 raise ValueError("it contains no reference")
             return found, name

@@ -1,7 +1,6 @@
-"""Figures in one style: forces, lives, worn bushings."""
+"""Figures in one style, and the figure of a life."""
 
 import io
-from collections.abc import Sequence
 
 import matplotlib
 import numpy as np
@@ -9,13 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from leg_wear_monitor.dynamics.result import Trace
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.recordings.result import ReplaySummary
-from leg_wear_monitor.wear import BUSHING, JOURNAL, wear_zone
 
 # Style of the figures: matplotlib without pyplot, in colours that colour-blind readers can distinguish.
 
@@ -116,43 +112,7 @@ def _greatest(values: Floats) -> float:
     return float(known.max()) if len(known) else 0.0
 
 
-# Drive torque and joint forces over the crank angle, from a trace.
-
-
-LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
-
-
-def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
-    """Figure of a simulation's trace: a panel for the drive torque and one for each joint.
-
-    Parameters
-    ----------
-    trace : Trace
-    joints : sequence of str
-        Joints to show, in this order.
-
-    Returns
-    -------
-    Figure
-    """
-    turns = trace.crank_angle_rad / TURN
-    figure = new_figure(9.0, 1.1 * (1 + len(joints)) + 0.6)
-    panels = np.atleast_1d(figure.subplots(1 + len(joints), 1, sharex=True))
-    _draw(panels[0], turns, trace.drive_torque_nm, "drive\n[N m]", VERMILION)
-    for axes, name in zip(panels[1:], joints, strict=True):
-        _draw(axes, turns, np.maximum(trace.force_n[name], LEAST_N), f"{name}\n[N]", BLUE)
-        axes.set_yscale("log")
-    panels[-1].set_xlabel("turns of the crank, from the first used turn", fontsize=SMALL)
-    panels[0].set_xlim(turns.min(), turns.max())
-    title = f"Drive torque and joint forces; at {LEAST_N} N the journal is free"
-    figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
-    return figure
-
-
-def _draw(axes: Axes, turns: Floats, values: Floats, label: str, colour: str) -> None:
-    axes.plot(turns, values, color=colour, linewidth=0.7)
-    axes.set_ylabel(label, fontsize=SMALL, rotation=0.0, ha="right", va="center")
-    tidy(axes)
+LEAST_N = 0.1  # lower end of a logarithmic axis [N]: the force of a journal in free flight is 0
 
 
 # Figure of a leg's wear life: clearances and peak forces over gait cycles.
@@ -174,40 +134,10 @@ def life_picture(life: Life) -> bytes:
 
 def draw_life(axes: Axes, life: Life) -> None:
     """Mean (and dashed, largest) clearance [µm] of each joint over the gait cycles."""
-    mean, largest = 1e6 * life.clearance_m, 1e6 * life.clearance_max_m
-    draw_clearances(axes, life.cycles, mean, largest, life.clearance_joints)
-
-
-def draw_clearances(
-    axes: Axes, cycles: Floats, mean: Floats, largest: Floats, names: Sequence[str | None]
-) -> None:
-    """Mean clearance and, dashed, largest clearance (n, k) of joints over the gait cycles (n,)."""
-    for k, joint in enumerate(names):
-        axes.plot(cycles, mean[:, k], color=_colour(k), label=joint)
-        axes.plot(cycles, largest[:, k], color=_colour(k), ls="--", lw=0.7)
+    for k, joint in enumerate(life.clearance_joints):
+        axes.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=_colour(k), label=joint)
+        axes.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=_colour(k), ls="--", lw=0.7)
 
 
 def _colour(k: int) -> str:
     return BODY_COLOURS[k % len(BODY_COLOURS)]
-
-
-def worn_bushings(depth: Floats, names: Sequence[str], title: str) -> Figure:
-    """Figure of the wear depth (k, 2, N) [m] of bushing and journal over the angle, joint by joint.
-
-    The angles that contain 90 % of the bushing's wear are shaded.
-    """
-    scale, unit = length_unit(float(depth.max()))
-    figure = new_figure(max(2, len(names)) * 2.3, 2.8)
-    panels = figure.subplots(1, len(names), squeeze=False)[0]
-    angle = (np.arange(depth.shape[-1]) + 0.5) * (360.0 / depth.shape[-1])
-    for axes, name, worn in zip(panels, names, depth, strict=True):
-        if (zone := wear_zone(worn[BUSHING])) is not None:
-            for turn in (0.0, -360.0):  # a zone may cross 360 degrees
-                axes.axvspan(zone[0] + turn, zone[1] + turn, color=PALE, alpha=0.6, linewidth=0.0)
-        axes.plot(angle, scale * worn[BUSHING], color=BLUE, linewidth=1.2, label="bushing")
-        axes.plot(angle, scale * worn[JOURNAL], color=VERMILION, linewidth=1.2, label="journal")
-        axes.set(xlim=(0.0, 360.0), xticks=(0.0, 90.0, 180.0, 270.0, 360.0), ylim=(0.0, None))
-        finish(axes, name, x="angle in its own body [°]", columns=1)
-    panels[0].set_ylabel(f"depth [{unit}]", fontsize=SMALL)
-    figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
-    return figure

@@ -1,4 +1,4 @@
-"""The leg as a figure, and the figures of a simulation."""
+"""The leg as a figure."""
 
 from collections.abc import Collection
 
@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from leg_wear_monitor.dynamics.result import SimulationResult
 from leg_wear_monitor.mechanism.position import carriers, corners
 from leg_wear_monitor.mechanism.reach import Reach, reach_of
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
@@ -19,12 +18,8 @@ from leg_wear_monitor.report.figure import (
     USUAL,
     VERMILION,
     finish,
-    force_traces,
     new_figure,
     plain,
-    png,
-    use_own_style,
-    worn_bushings,
 )
 
 
@@ -69,17 +64,3 @@ def leg_picture(mechanism: Mechanism, joints: Collection[str]) -> Figure:
     finish(axes, plain(mechanism.name), x="x [m]", y="y [m]")
     axes.legend(fontsize=SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
-
-
-def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
-    """PNG files by file name; None for a figure that needs data which the result does not contain."""
-    use_own_style()
-    joints = result.clearance_joints
-    files = {"leg.png": png(leg_picture(mechanism, joints)), "wear.png": None, "forces.png": None}
-    if result.trace is not None:
-        files["forces.png"] = png(force_traces(result.trace, joints or tuple(mechanism.joints)))
-    if result.surfaces is not None and joints:
-        cycles = abs(result.speed_rpm) / 60.0 * result.simulated_s
-        title = f"Wear after {cycles:.4g} gait cycles"
-        files["wear.png"] = png(worn_bushings(result.surfaces.depth, joints, title))
-    return files

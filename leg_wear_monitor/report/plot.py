@@ -1,5 +1,6 @@
 """Pictures of results and mechanisms on matplotlib axes."""
 
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
 
@@ -31,11 +32,14 @@ from leg_wear_monitor.report.figure import (
     draw_life,
     finish,
     length_unit,
+    new_figure,
     opened,
     plain,
+    png,
     time_of,
+    use_own_style,
 )
-from leg_wear_monitor.report.leg_picture import draw_leg
+from leg_wear_monitor.report.leg_picture import draw_leg, leg_picture
 from leg_wear_monitor.state import Figure
 from leg_wear_monitor.wear import BUSHING, JOURNAL
 
@@ -129,10 +133,14 @@ def _force(result: SimulationResult, axes: Axes) -> Axes:
     if result.trace is None:
         _bars(axes, result)
         return _finished(axes, "", "force [N]")
-    for k, name in enumerate(result.clearance_joints or tuple(result.joints)):
-        force = np.maximum(result.trace.force_n[name], LEAST_N)
-        colour = BODY_COLOURS[k % len(BODY_COLOURS)]
-        axes.plot(result.trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
+    return _forces(result.trace, result.clearance_joints or tuple(result.joints), axes)
+
+
+def _forces(trace: Trace, joints: Sequence[str], axes: Axes) -> Axes:
+    """Forces over the turns of the crank; a journal in free flight is at the lower end of the axis."""
+    for k, name in enumerate(joints):
+        force, colour = np.maximum(trace.force_n[name], LEAST_N), BODY_COLOURS[k % len(BODY_COLOURS)]
+        axes.plot(trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
     axes.set_yscale("log")
     return _finished(axes, _TURNS, "force [N]")
 
@@ -242,3 +250,26 @@ def _finished(axes: Axes, x: str, y: str) -> Axes:
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=SMALL, frameon=False)
     return axes
+
+
+def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
+    """PNG files by file name; None for a figure that needs data which the result does not contain."""
+    use_own_style()
+    joints = result.clearance_joints
+    files = {"leg.png": png(leg_picture(mechanism, joints)), "wear.png": None, "forces.png": None}
+    if result.trace is not None:
+        shown = joints or tuple(result.joints)
+        figure = new_figure(9.0, 1.4 * (1 + len(shown)) + 0.6)
+        first, *others = figure.subplots(1 + len(shown), 1, sharex=True)
+        _column(result.trace, "torque", first)
+        for name, axes in zip(shown, others, strict=True):
+            _forces(result.trace, [name], axes)
+        for axes in figure.axes:
+            axes.label_outer()
+        files["forces.png"] = png(figure)
+    if result.surfaces is not None and joints:
+        figure = new_figure(2.3 * max(2, len(joints)), 2.8)
+        for name, axes in zip(joints, figure.subplots(1, len(joints), squeeze=False)[0], strict=True):
+            _wear(result, name, axes)
+        files["wear.png"] = png(figure)
+    return files

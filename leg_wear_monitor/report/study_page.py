@@ -51,6 +51,7 @@ _AXES = {
     "speed_rpm": ("crank speed [rpm]", 1.0),
     "ground_n": ("vertical force of the ground, peak [N]", 1.0),
 }
+_Figures = Mapping[str, tuple[str, float]]  # title and factor from SI of a statistic, by name
 _FORCES = {
     "peak_force_n": ("largest force in a cycle [N]", 1.0),
     "p99_force_n": ("99th percentile of the force [N]", 1.0),
@@ -64,6 +65,14 @@ _WEAR = {
     DEPTH: ("greatest wear depth [pm/cycle]", 1.0e12),
     ARCHARD: ("∫ F |v| dt [J/cycle]", 1.0),
 }
+_OF_FORCES = (
+    "Mean and standard deviation: largest forces and impacts over the cycles of all runs, the rest over "
+    "runs. A single largest force is random; compare the percentile. A periodic force repeats to 100 %."
+)
+_OF_WEAR = (
+    "1 pm per cycle is 1 µm in a million cycles. Mean and standard deviation over runs. Angles are in the "
+    "frame of the body with the bushing. Depths are proportional to the wear coefficient."
+)
 _CHARTS = ("peak_force_n", "p99_force_n", "mean_force_n", DEPTH, ARCHARD)
 _MOST_SHOWN = 6  # points with curves and surfaces; of more points, the first, the middle and the last
 _KEY = "Shaded: the middle 90 % of all cycles. Blue: one cycle of one run, as an example. Dashed: ideal leg."
@@ -81,7 +90,11 @@ def study_page(results: StudyResults) -> Page:
         parts["Claims of the paper"] = [_claims(responses)]
     if found:
         shown = found if len(found) <= _MOST_SHOWN else [found[0], found[len(found) // 2], found[-1]]
-        parts["Results"] = [_error_table(found), *_sum_table(found), _force_table(found), _wear_table(found)]
+        parts["Results"] = [
+            _error_table(found),
+            _joint_table("Contact forces and impacts", found, _FORCES, (), _OF_FORCES),
+            _joint_table("Wear of the bushings", found, _WEAR, (0.5, 0.9), _OF_WEAR),
+        ]
         parts["Comparison"] = [_comparison(found)] if len(found) > 1 else []
         parts["Curves of a cycle"] = _curves(shown)
     if exponents:
@@ -119,31 +132,18 @@ def _question(results: StudyResults) -> list[Part]:
     ]
 
 
-# Numbers as text, and tables.
+# Tables.
 
 
 def number(value: float) -> str:
-    """A number with three significant digits; with an exponent below 0.001 and from a million on."""
-    if not math.isfinite(value):
-        return "–"
-    if value == 0.0:
-        return "0"
-    if not 1.0e-3 <= abs(value) < 1.0e6:
-        return f"{value:.2e}"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+    """A number with three significant digits; a dash if it is not known."""
+    return f"{value:.3g}" if math.isfinite(value) else "–"
 
 
 def with_spread(value: Spread, factor: float = 1.0) -> str:
-    """Mean and standard deviation, with two digits of the deviation and at most four of the mean."""
-    mean, deviation = factor * value.mean, factor * value.deviation
-    if not deviation > 0.0 or mean == 0.0:
-        return number(mean)
-    most = max(0, 3 - math.floor(math.log10(abs(mean))))
-    digits = max(0, min(most, 1 - math.floor(math.log10(deviation))))
-    least = 10.0**-digits
-    return f"{mean:.{digits}f} ± " + (
-        f"{deviation:.{digits}f}" if deviation >= 0.5 * least else f"<{least:.{digits}f}"
-    )
+    """Mean with three digits, and standard deviation with two."""
+    deviation = factor * value.deviation
+    return number(factor * value.mean) + (f" ± {deviation:.2g}" if deviation > 0.0 else "")
 
 
 def _zone_text(zone: tuple[float, float] | None) -> str:
@@ -178,69 +178,20 @@ def _error_table(found: Found) -> Table:
     )
 
 
-def _sum_table(found: Found) -> list[Table]:
-    """Errors with all clearances, compared with the sum over the places, if the last point has all joints."""
-    *others, (_, whole) = found
-    alone, each = [], set[str]()
-    for _, arrays in others:
-        joints = set(clearance_joints_of(arrays))
-        if not joints & each:
-            alone.append(arrays)
-            each |= joints
-    if len(alone) < 2 or each != set(clearance_joints_of(whole)):
-        return []
-    rows = []
-    for name, title, unit, factor in _known(found):
-        total = sum(largest_error(arrays, name).mean for arrays in alone)
-        together = largest_error(whole, name)
-        part = f"{100.0 * together.mean / total:.0f} %"
-        rows.append([f"{title} [{unit}]", with_spread(together, factor), number(factor * total), part])
-    head = ("largest error", "all at once", "sum of the places alone", "of the sum")
-    return [Table(caption="All clearances at once against the sum of each place", head=head, rows=rows)]
-
-
-def _joint_rows(found: Found) -> list[tuple[str, Arrays, str]]:
-    return [
-        (point.label if point.label == joint else f"{point.label}: {joint}", arrays, joint)
+def _joint_table(caption: str, found: Found, figures: _Figures, zones: Sequence[float], note: str) -> Table:
+    """A row per clearance joint of each point: figures, and the zones with some fractions of the wear."""
+    rows = [
+        [
+            point.label if point.label == joint else f"{point.label}: {joint}",
+            *(with_spread(of_joint(arrays, name, joint), factor) for name, (_, factor) in figures.items()),
+            *(_zone_text(worst_zone(arrays, joint, fraction)) for fraction in zones),
+        ]
         for point, arrays in found
         for joint in clearance_joints_of(arrays)
     ]
-
-
-def _force_table(found: Found) -> Table:
-    rows = [
-        [
-            label,
-            *(with_spread(of_joint(arrays, name, joint), factor) for name, (_, factor) in _FORCES.items()),
-        ]
-        for label, arrays, joint in _joint_rows(found)
-    ]
-    note = (
-        "Mean and standard deviation: largest forces and impacts over the cycles of all runs, the rest over "
-        "runs. A single largest force is random; compare the percentile. A periodic force "
-        "repeats to 100 %."
-    )
-    head = ["joint", *(title for title, _ in _FORCES.values())]
-    return Table(
-        caption="Contact forces and impacts of the clearance joints", head=head, rows=rows, note=note
-    )
-
-
-def _wear_table(found: Found) -> Table:
-    rows = [
-        [
-            label,
-            *(with_spread(of_joint(arrays, name, joint), factor) for name, (_, factor) in _WEAR.items()),
-            *(_zone_text(worst_zone(arrays, joint, fraction)) for fraction in (0.5, 0.9)),
-        ]
-        for label, arrays, joint in _joint_rows(found)
-    ]
-    note = (
-        "1 pm per cycle is 1 µm in a million cycles. Mean and standard deviation over runs. Angles are in "
-        "the frame of the body with the bushing. Depths are proportional to the wear coefficient."
-    )
-    head = ["joint", *(title for title, _ in _WEAR.values()), "zone with half of the wear", "zone with 90 %"]
-    return Table(caption="Wear of the bushings", head=head, rows=rows, note=note)
+    titles = [title for title, _ in figures.values()]
+    head = ["joint", *titles, *(f"zone with {100.0 * fraction:g} % of the wear" for fraction in zones)]
+    return Table(caption=caption, head=head, rows=rows, note=note)
 
 
 def _exponent_table(exponents: Found) -> Table:
@@ -387,10 +338,7 @@ def _sections_of_cycles(results: StudyResults) -> dict[str, Sequence[Part]]:
     for point, arrays in results.of("portrait"):
         cycles, angle = len(arrays["section_rate_mps"]), point.settings["crank_angle_deg"]
         text = f"One point per cycle at crank angle {angle:g}°, over {cycles} cycles."
-        parts["Poincaré maps"] = [
-            _map_table(point.clearance_m, arrays),
-            _planes(point.clearance_m, arrays, "section", text),
-        ]
+        parts["Poincaré maps"] = [_planes(point.clearance_m, arrays, "section", text)]
         text = "The journal's place in its bushing against its rate, some cycles of one run as an example."
         parts["Phase portraits"] = [_planes(point.clearance_m, arrays, "portrait", text)]
     diagrams = []
@@ -402,30 +350,16 @@ def _sections_of_cycles(results: StudyResults) -> dict[str, Sequence[Part]]:
     return parts | {"Bifurcation diagrams": diagrams}
 
 
-def _map_table(clearance_m: float, arrays: Arrays) -> Table:
-    rows = []
-    for k, joint in enumerate(clearance_joints_of(arrays)):
-        places = arrays["section_eccentricity_m"][:, k] / clearance_m
-        rows.append([joint, number(float(np.sqrt(places.var(axis=0).sum())))])
-    return Table(caption="Scatter of the map", head=("joint", "scatter (RMS) [clearances]"), rows=rows)
-
-
 def _planes(clearance_m: float, arrays: Arrays, kind: str, caption: str) -> Gallery:
     """A picture for each joint: its place against its rate, x and y side by side."""
-    places, rates, pictures = (
-        arrays[f"{kind}_eccentricity_m"] / clearance_m,
-        1.0e3 * arrays[f"{kind}_rate_mps"],
-        [],
-    )
+    places, rates = arrays[f"{kind}_eccentricity_m"] / clearance_m, 1.0e3 * arrays[f"{kind}_rate_mps"]
+    style, pictures = "." if kind == "section" else "-", []
     for k, joint in enumerate(clearance_joints_of(arrays)):
         figure = new_figure(4.8, 2.5)
         for i, axes in enumerate(figure.subplots(1, 2)):
-            style = "." if kind == "section" else "-"
             axes.plot(places[:, k, i], rates[:, k, i], style, color=BLUE, markersize=2.0, linewidth=0.35)
             finish(axes, joint, x=f"{'xy'[i]} / clearance", y="" if i else "rate [mm/s]")
-        most = np.abs(rates[:, k]).max()
-        alt = f"{caption.partition('.')[0]}: joint {joint}, rates within {most:.0f} mm/s"
-        pictures.append(Picture(image=png(figure), alt=alt))
+        pictures.append(Picture(image=png(figure), alt=f"{caption.partition('.')[0]}: joint {joint}"))
     return Gallery(
         pictures=pictures,
         caption=f"{caption} Beyond 1 and -1 clearances the journal presses into the bushing.",

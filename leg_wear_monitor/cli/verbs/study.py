@@ -271,7 +271,7 @@ def _write(
     written: list[Path] = []
     text = result.to_json(wall_s)
     if out is not None:
-        from leg_wear_monitor.report.leg_picture import pictures
+        from leg_wear_monitor.report.plot import pictures
 
         written += common.write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
     return written + common.write_json(json_file, text)

@@ -6,20 +6,16 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.recordings.result import ReplaySummary
 from leg_wear_monitor.report.figure import time_of
 from leg_wear_monitor.report.page import (
-    NOT_VALID,
     Chart,
     Panel,
     Part,
     Section,
     Series,
-    Table,
     Text,
     not_valid,
-    value,
 )
 from leg_wear_monitor.report.replay.joints import SIGMAS
 from leg_wear_monitor.state import Figure
@@ -178,78 +174,14 @@ def _force_panel(summary: ReplaySummary, joint: str) -> Panel:
     return Panel("Contact force", series if is_valid else [], low=0.0, height=150)
 
 
-# The clearance joints over time and at the end.
+# The clearance joints over time.
 
 
 def joint_section(summary: ReplaySummary) -> Section:
-    """A chart per joint, and tables of the clearances, forces and loads at the end."""
-    invalid = summary.verdict.not_valid
+    """A chart per joint, and the joints beyond the limits of their materials."""
     parts = [part for joint in summary.joints for part in joint_trends(summary, joint)]
-    if Figure.CLEARANCES not in invalid:
-        parts.append(_table(summary))
-    if Figure.IMPACT_FORCES not in invalid:
-        parts += [_forces(summary), *_loads(summary)]
+    if Figure.IMPACT_FORCES not in summary.verdict.not_valid:
+        loads = {summary.leg.joint_words(name): joint.load for name, joint in summary.joints.items()}
+        beyond = {name: load.outside_limits for name, load in loads.items() if load and load.outside_limits}
+        parts += [Text(f"{name}: {words}.", is_not_valid=True) for name, words in beyond.items()]
     return Section("Joints over time", parts, is_folded=True)
-
-
-def _table(summary: ReplaySummary) -> Table:
-    has_growth = Figure.GROWTH not in summary.verdict.not_valid
-    rows = []
-    for name, joint in summary.joints.items():
-        known = summary.clearances[name]
-        clearances_m = (known.best_estimate_m, known.modelled_m, known.estimated_m, known.measured_m)
-        row = [summary.leg.joint_words(name), *(value(1.0e3, each) for each in clearances_m)]
-        for growth in (joint.growth_m_per_cycle, joint.growth_error_m_per_cycle):
-            row.append(value(1.0e12, growth) if has_growth else NOT_VALID)
-        rows.append(tuple(row))
-    head = ("joint", "best estimate [mm]", "modelled [mm]", "estimated [mm]", "measured [mm]")
-    return Table(
-        caption="Clearances at the end",
-        head=(*head, "growth [pm/cycle]", "± [pm/cycle]"),
-        rows=rows,
-        note="Modelled: the clearance when new plus the modelled wear. Estimated: from the drive torque or "
-        "the encoders. Measured: by hand. ± is one standard deviation of the growth: gait cycles "
-        "scatter, and the leg may differ from its file.",
-    )
-
-
-def _forces(summary: ReplaySummary) -> Table:
-    rows = [
-        (
-            summary.leg.joint_words(name),
-            value(1.0, joint.peak_force_n),
-            value(1.0, joint.mean_force_n),
-            str(joint.impacts),
-        )
-        for name, joint in summary.joints.items()
-    ]
-    return Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
-
-
-def _loads(summary: ReplaySummary) -> list[Part]:
-    """Pressure, sliding speed and p v of each joint in the last gait cycle, against its material's limits."""
-    loads = {summary.leg.joint_words(name): joint.load for name, joint in summary.joints.items()}
-    rows = [(name, *_load_cells(load)) for name, load in loads.items() if load is not None]
-    if not rows:
-        return []
-    table = Table(
-        caption="Pressure and sliding speed in the last gait cycle, and the limits of the materials",
-        head=("joint", "p mean [MPa]", "p p99 [MPa]", "limit", "v [m/s]", "limit", "p v [MPa m/s]", "limit"),
-        rows=rows,
-        note="p: force over diameter times width. v: mean sliding speed under load. A dash: the material has "
-        "no such limit. Beyond a limit, the wear coefficient is not valid.",
-    )
-    texts = (f"{name}: {one.outside_limits}." for name, one in loads.items() if one and one.outside_limits)
-    return [table, *(Text(text, is_not_valid=True) for text in texts)]
-
-
-def _load_cells(load: BushingLoad) -> tuple[str, ...]:
-    return (
-        value(1.0e-6, load.mean_pressure_pa),
-        value(1.0e-6, load.p99_pressure_pa),
-        value(1.0e-6, load.pressure_limit_pa),
-        value(1.0, load.mean_sliding_speed_mps),
-        value(1.0, load.sliding_speed_limit_mps),
-        value(1.0e-6, load.mean_pressure_speed_pa_mps),
-        value(1.0e-6, load.pressure_speed_limit_pa_mps),
-    )

@@ -20,8 +20,7 @@ _MEASURED = ((True, "measured", "--series-0"), (False, "contradicts, not used", 
 def forecast_section(summary: ReplaySummary) -> Section:
     """Section of the page."""
     doubt = not_valid(summary.verdict, Figure.FORECAST)
-    parts: list[Part] = [Text(sentence) for sentence in leg_sentence(summary)]
-    parts.append(Text(doubt, is_not_valid=True) if doubt else _table(summary))
+    parts: list[Part] = [Text(doubt, is_not_valid=True) if doubt else _table(summary)]
     parts += [
         Text(f"The life of {basis}.")
         for basis in bases(
@@ -71,19 +70,6 @@ def _lasts(forecast: JointForecast | LegForecast) -> list[str]:
     return [three_digits(getattr(hours, fraction)) if hours else "-" for fraction in FRACTIONS]
 
 
-def leg_sentence(summary: ReplaySummary) -> list[str]:
-    """How long the leg lasts, if that is known."""
-    leg = summary.forecast
-    if leg is None or leg.hours is None or leg.first is None or not_valid(summary.verdict, Figure.FORECAST):
-        return []
-    lasts = [f"{hours} hours of walking" for hours in _lasts(leg)]
-    first, probability = summary.leg.joint_words(leg.first), 100.0 * leg.first_probability[leg.first]
-    return [
-        f"The leg lasts {lasts[1]} (p10 {lasts[0]}, p90 {lasts[2]}); {first} is the first joint at its "
-        f"limit with a probability of {probability:.0f} %."
-    ]
-
-
 def _validity(measurements: Sequence[Measurement]) -> Chart:
     """Each measured clearance in the distribution that was predicted before it."""
     kept = sorted((each for each in measurements if not each.is_withdrawn), key=lambda each: each.cycles)
@@ -123,21 +109,7 @@ def wear_section(summary: ReplaySummary) -> Section:
     doubt = not_valid(summary.verdict, Figure.CLEARANCES)
     if doubt:
         return Section(_TITLE, [Text(doubt, is_not_valid=True)], is_folded=True)
-    return Section(_TITLE, [Text(_deepest(summary)), wear_chart(summary)], is_folded=True)
-
-
-def _deepest(summary: ReplaySummary) -> str:
-    """The deepest wear next to the clearance limit, which gives it a scale."""
-    depths = {name: _greatest(worn) for name, worn in summary.wear_depth_m.items()}
-    name = max(depths, key=lambda joint: depths[joint], default="")
-    if not name or not depths[name]:
-        return "No wear is modelled."
-    factor, unit = length_unit(depths[name])
-    limit = summary.clearances[name].limit_m if name in summary.clearances else None
-    beside = f", {100.0 * depths[name] / limit:.2g} % of the limit of its clearance" if limit else ""
-    joint = summary.leg.joint_words(name)
-    what = "The deepest wear, including corrections of the clearance,"
-    return f"{what} is {factor * depths[name]:.3g} {unit}, in joint {joint}{beside}."
+    return Section(_TITLE, [wear_chart(summary)], is_folded=True)
 
 
 def wear_chart(summary: ReplaySummary) -> Chart:

@@ -1,7 +1,6 @@
 """Range of the linkage: where it closes, and how far its crank turns."""
 
 from collections import deque
-from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -13,32 +12,21 @@ from leg_wear_monitor.mechanism.loader import suspects
 from leg_wear_monitor.mechanism.position import (
     TURN,
     Linkage,
-    all_but,
     far_from_start,
     find_assembly,
     follow,
     furthest,
     mobility,
     nearest,
-    newton,
     open_joint,
     point_path,
 )
 from leg_wear_monitor.mechanism.spec import Mechanism, PrismaticJoint
 
-
-class DeadPoint(NamedTuple):
-    """A position that the crank cannot pass: its angle [rad], and coordinates (n, 3)."""
-
-    crank_angle: float
-    q: Floats
-
-
 # Positions of a mechanism over its crank's range: all of them if it works, the possible ones if not.
 
 
 POINTS = 180  # positions per cycle, enough to look smooth
-_OPEN_POINTS = 72  # fewer steps for an open mechanism, because its positions take long
 _VISIBLE = 0.02  # fraction of the largest gap
 _CLOSED = 1.0e-9  # gap [m] below which a joint counts as closed
 
@@ -53,7 +41,8 @@ class Reach:
     mobility : int
         Degrees of freedom; 1 for a mechanism with one drive. With any other number, there is one position.
     crank_angle : (p,) array, rad
-        Rising; a whole turn from 0 if the crank turns through.
+        Rising; a whole turn from 0 if the crank turns through, else between two dead points, which the crank
+        cannot pass.
     q : (p, n, 3) array
         Coordinates at these angles; the coordinates with the least gap if the mechanism does not close.
     turns : bool
@@ -61,10 +50,8 @@ class Reach:
     open_joint : str
         Joint that does not close at the crank angle of the assembly, with all others closed; empty if all
         close there.
-    gap_m : (p,) array
+    gap_m : float
         Gap of this joint.
-    low, high : DeadPoint or None
-        Ends of the range in which it closes; None if the crank turns through, or it never closes.
     fault : str
         Fault of the assembly; empty if there is none.
     """
@@ -75,15 +62,18 @@ class Reach:
     q: Floats
     turns: bool = False
     open_joint: str = ""
-    gap_m: Floats = attrs.field(factory=lambda: np.zeros(1))
-    low: DeadPoint | None = None
-    high: DeadPoint | None = None
+    gap_m: float = 0.0
     fault: str = ""
 
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism."""
         return self.linkage.mechanism
+
+    @property
+    def rocks(self) -> bool:
+        """True if it closes between two dead points only."""
+        return not self.turns and len(self.q) > 1
 
     def path(self, body: str, point: str) -> Floats:
         """Position (p, 2) [m] of a point of a body."""
@@ -104,16 +94,8 @@ class Reach:
         return float(self.gap_of(joint).max()) > max(_VISIBLE * largest, _CLOSED)
 
 
-def reach_of(mechanism: Mechanism, crank_angle: float | None = None, points: int = POINTS) -> Reach:
+def reach_of(mechanism: Mechanism) -> Reach:
     """Positions of a mechanism over the range of its crank.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    crank_angle : float, optional
-        An angle [rad] that the result must include, if the crank reaches it.
-    points : int
-        Positions over the range, where the mechanism closes.
 
     Raises
     ------
@@ -122,47 +104,35 @@ def reach_of(mechanism: Mechanism, crank_angle: float | None = None, points: int
     """
     arrays = compile_arrays(mechanism)
     linkage = Linkage(mechanism, arrays, select_rows(arrays, range(len(mechanism.joints)), driven=True))
-    wanted = () if crank_angle is None else (crank_angle,)
     with np.errstate(all="ignore"):  # the result is checked below
-        reach = _reach(linkage, np.array(wanted), points)
+        reach = _reach(linkage)
     if not np.isfinite(reach.q).all():
         raise AssemblyError(f"{mechanism.source}: bodies: lengths are too far apart to place the bodies")
     return reach
 
 
-def _reach(linkage: Linkage, wanted: Floats, points: int) -> Reach:
+def _reach(linkage: Linkage) -> Reach:
     freedom, start = mobility(linkage.mechanism), linkage.mechanism.assembly.crank_angle
     if freedom != 1:
         q = nearest(linkage, com_poses(linkage.mechanism), start, np.ones(len(linkage.rows.body)))
         return Reach(linkage, freedom, np.array([start]), q[None])
     found = find_assembly(linkage)
     if found is None:
-        return _open(linkage, wanted)
-    return attrs.evolve(_closed(linkage, found, start, wanted, points), fault=far_from_start(linkage, found))
+        joint, gap_m, q = open_joint(linkage)
+        return Reach(linkage, 1, np.array([start]), q[None], open_joint=joint, gap_m=gap_m)
+    return attrs.evolve(_closed(linkage, found, start), fault=far_from_start(linkage, found))
 
 
-def _closed(linkage: Linkage, q: Floats, angle: float, wanted: Floats, points: int) -> Reach:
+def _closed(linkage: Linkage, q: Floats, angle: float) -> Reach:
     """Reach of a linkage that closes at a crank angle [rad] with coordinates q."""
-    last, there = furthest(linkage, q, angle, angle + TURN)
-    if last == angle + TURN:
-        angles = np.union1d(np.arange(points) * (TURN / points), wanted % TURN)
-        return Reach(
-            linkage, 1, angles, _followed(linkage, q, angle, angles), True, gap_m=np.zeros(len(angles))
-        )
-    high, low = DeadPoint(last, there), DeadPoint(*furthest(linkage, q, angle, angle - TURN))
-    angles = np.linspace(low.crank_angle, high.crank_angle, points)[1:-1]
-    inside = low.crank_angle + (wanted - low.crank_angle) % TURN
-    angles = np.union1d(angles, np.clip(inside[inside <= high.crank_angle], angles[0], angles[-1]))
-    between = _followed(linkage, q, angle, angles)
-    return Reach(
-        linkage,
-        1,
-        np.array([low.crank_angle, *angles, high.crank_angle]),
-        np.stack([low.q, *between, high.q]),
-        gap_m=np.zeros(len(angles) + 2),
-        low=low,
-        high=high,
-    )
+    high, at_high = furthest(linkage, q, angle, angle + TURN)
+    if high == angle + TURN:
+        angles = np.asarray(np.arange(POINTS) * (TURN / POINTS), np.float64)
+        return Reach(linkage, 1, angles, _followed(linkage, q, angle, angles), turns=True)
+    low, at_low = furthest(linkage, q, angle, angle - TURN)
+    angles = np.asarray(np.linspace(low, high, POINTS), np.float64)
+    between = _followed(linkage, q, angle, angles[1:-1])
+    return Reach(linkage, 1, angles, np.stack([at_low, *between, at_high]))
 
 
 def _followed(linkage: Linkage, q: Floats, angle: float, angles: Floats) -> Floats:
@@ -177,40 +147,6 @@ def _followed(linkage: Linkage, q: Floats, angle: float, angles: Floats) -> Floa
     return found
 
 
-def _open(linkage: Linkage, wanted: Floats) -> Reach:
-    """Reach of a linkage that does not close at the crank angle of its assembly."""
-    joint, gap_m, q = open_joint(linkage)
-    start, weight = linkage.mechanism.assembly.crank_angle, all_but(linkage, joint)
-    angles = np.arange(_OPEN_POINTS) * (TURN / _OPEN_POINTS)
-    angles = start + np.union1d(angles, (wanted - start) % TURN)
-    places = np.empty((len(angles), *q.shape))
-    for i, angle in enumerate(angles):
-        q = places[i] = nearest(linkage, q, float(angle), weight)
-    reach = Reach(linkage, 1, angles, places, open_joint=joint)
-    gaps = (
-        np.array([gap_m])
-        if isinstance(linkage.mechanism.joints[joint], PrismaticJoint)
-        else reach.gap_of(joint)
-    )
-    gaps = np.broadcast_to(gaps, (len(angles),)).copy()
-    low, high = _closes_between(linkage, reach, gaps)
-    return attrs.evolve(reach, gap_m=gaps, low=low, high=high)
-
-
-def _closes_between(
-    linkage: Linkage, reach: Reach, gaps: Floats
-) -> tuple[DeadPoint | None, DeadPoint | None]:
-    """Ends of the range of crank angles that close the joint that is open at the start."""
-    i = int(gaps.argmin())
-    angle = float(reach.crank_angle[i])
-    q = newton(linkage, reach.q[i], angle) if gaps[i] < _CLOSED else None
-    if q is None:
-        return None, None
-    ends = (furthest(linkage, q, angle, angle + side * TURN) for side in (-1.0, 1.0))
-    low, high = (DeadPoint(*end) for end in ends)
-    return low, high
-
-
 # Faults of a mechanism that does not close or turn, in words.
 
 
@@ -219,8 +155,8 @@ def headline(reach: Reach) -> str:
     if reach.mobility != 1:
         return f"mobility is {reach.mobility}. Expected 1"
     if reach.open_joint:
-        return f"does not close: {gap_words(reach, 0)}"
-    if not reach.turns:
+        return f"does not close: {_gap(reach)}"
+    if reach.rocks:
         return f"the crank does not turn through: {_range(reach)}"
     return "closes, and the crank turns through" if not reach.fault else "closes far from the given start"
 
@@ -234,10 +170,9 @@ def findings(reach: Reach) -> tuple[str, ...]:
     return (*found[:-1], found[-1] + doubts) if found else ()
 
 
-def gap_words(reach: Reach, i: int) -> str:
-    """The gap of the open joint at position ``i``."""
+def _gap(reach: Reach) -> str:
     joint = reach.mechanism.joint_words(reach.open_joint)
-    return f"joint {joint} is open by {1e3 * reach.gap_m[i]:.3g} mm"
+    return f"joint {joint} is open by {1e3 * reach.gap_m:.3g} mm"
 
 
 def loop_of(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
@@ -271,34 +206,21 @@ def _mobility(reach: Reach) -> list[str]:
 def _open_words(reach: Reach) -> list[str]:
     if not reach.open_joint:
         return []
-    mechanism, least = reach.mechanism, int(reach.gap_m.argmin())
+    mechanism = reach.mechanism
     bodies = " and ".join(mechanism.sides(reach.open_joint))
-    text = (
-        f"assembly: {gap_words(reach, 0)} between {bodies} at crank angle {_degrees(reach.crank_angle[0])}, "
-        "with all other joints closed"
-    )
-    if reach.low is not None:
-        text += f"; it closes only {_range(reach)}"
-    else:
-        angle = _degrees(reach.crank_angle[least] % TURN)
-        text += f"; the least gap is {1e3 * reach.gap_m[least]:.3g} mm, at {angle}"
+    angle = f"{np.rad2deg(reach.crank_angle[0]):.1f} deg"
+    text = f"assembly: {_gap(reach)} between {bodies} at crank angle {angle}, with all other joints closed"
     if loop := loop_of(mechanism, reach.open_joint):
         text += f"; check the lengths of {', '.join(loop)}"
     return [text]
 
 
 def _turns(reach: Reach) -> list[str]:
-    if reach.open_joint or reach.low is None:
+    if not reach.rocks:
         return []
     return [f"drive.body: {reach.mechanism.drive.body} turns only {_range(reach)}, between two dead points"]
 
 
 def _range(reach: Reach) -> str:
-    if reach.low is None or reach.high is None:
-        return ""
-    low, high = reach.low.crank_angle, reach.high.crank_angle
-    return f"from {_degrees(low)} to {_degrees(high)}, {np.rad2deg(high - low):.1f} of 360 deg"
-
-
-def _degrees(angle: float) -> str:
-    return f"{np.rad2deg(angle):.1f} deg"
+    low, high = np.rad2deg(reach.crank_angle[[0, -1]])
+    return f"from {low:.1f} deg to {high:.1f} deg, {high - low:.1f} of 360 deg"

@@ -28,7 +28,7 @@ CREATOR = "leg-wear-monitor draw"  # in the head of every drawing
 
 def first_position(reach: Reach) -> int:
     """First position in the picture: crank angle 0, or the dead point in the direction of the drive."""
-    if reach.turns or reach.open_joint or reach.low is None:
+    if not reach.rocks:
         return 0
     drive = reach.mechanism.drive
     forwards = (
@@ -116,16 +116,15 @@ def leg_data(reach: Reach) -> dict[str, Any]:
     margin = 0.09 * float((high - low).max())
     corner = 1.0e3 * np.array([low[0] - margin, -high[1] - margin])
     size = 1.0e3 * (high - low + 2.0 * margin)
-    ends = ((0, reach.low), (len(reach.q) - 1, reach.high))
-    said = {i: "Dead point: the crank cannot pass it." for i, dead in ends if dead and not reach.open_joint}
+    ends = (0, len(reach.q) - 1) if reach.rocks else ()
     return {
         "bodies": sorted(_bodies(reach), key=lambda body: -float(np.ptp(body["outline"], axis=0).sum())),
         "joints": [_joint(reach, name) for name in mechanism.joints],
         "box": [round(float(value), 1) for value in (*corner, *size)],
         "toe": [] if mechanism.toe is None else _millimetres(reach.path(*mechanism.toe)),
         "angles": np.rad2deg(reach.crank_angle).round(1).tolist(),
-        "turns": reach.turns or (bool(reach.open_joint) and len(reach.q) > 1),
-        "said": said,
+        "turns": reach.turns,
+        "said": dict.fromkeys(ends, "Dead point: the crank cannot pass it."),
         "frames": len(reach.q),
     }
 

@@ -137,13 +137,13 @@ def _question(results: StudyResults) -> list[Part]:
 
 def number(value: float) -> str:
     """A number with three significant digits; a dash if it is not known."""
-    return f"{value:.3g}" if math.isfinite(value) else "–"
+    return f"{float(f'{value:.3g}'):g}" if math.isfinite(value) else "–"
 
 
 def with_spread(value: Spread, factor: float = 1.0) -> str:
     """Mean with three digits, and standard deviation with two."""
-    deviation = factor * value.deviation
-    return number(factor * value.mean) + (f" ± {deviation:.2g}" if deviation > 0.0 else "")
+    deviation = float(f"{factor * value.deviation:.2g}")
+    return number(factor * value.mean) + (f" ± {deviation:g}" if deviation > 0.0 else "")
 
 
 def _zone_text(zone: tuple[float, float] | None) -> str:

@@ -42,8 +42,7 @@ def test_what_does_not_close_is_drawn_and_said_with_its_gap(run, long_coupler):
     assert re.search(r"does not close: joint [A-D] .* is open by 200 mm$", result.out.strip())
     (line,) = result.lines
     assert line.startswith(f"warning: {long_coupler}: assembly: joint ")
-    assert "least gap is 100 mm, at 180.0 deg" in line
-    assert '"gap_mm": [200.0, ' in out.read_text()
+    assert '"gap_mm": [200.0]' in out.read_text()
 
 
 def test_a_start_far_from_the_assembly_is_drawn_as_found(run, shipped, tmp_path):

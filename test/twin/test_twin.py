@@ -790,7 +790,7 @@ def stance(leg: Mechanism) -> Floats:
 
 
 @pytest.fixture
-def twin(leg: Mechanism) -> DigitalTwin:
+def loaded_twin(leg: Mechanism) -> DigitalTwin:
     """A twin that takes the measured load."""
     return DigitalTwin(leg, MEASURED)
 
@@ -820,10 +820,10 @@ def test_rows_with_a_force_are_those_of_the_loaded_leg(leg, stance):
 
 
 @pytest.mark.parametrize("rate_hz, error", [(50, 4.0e-3), (200, 2.0e-3), (1000, 2.0e-3)])
-def test_the_mean_force_acts_from_the_second_gait_cycle_on(twin, gait, stance, rate_hz, error):
+def test_the_mean_force_acts_from_the_second_gait_cycle_on(loaded_twin, gait, stance, rate_hz, error):
     """Mean error over the peak; the mean itself lacks what is below a twentieth of the peak."""
-    cycles = twin.update(pushed(gait(5.0), stance, rate_hz)).cycles
-    wrong = twin._load.acting_n - stance
+    cycles = loaded_twin.update(pushed(gait(5.0), stance, rate_hz)).cycles
+    wrong = loaded_twin._load.acting_n - stance
     assert np.abs(wrong).mean() < error * PEAK_N
     assert np.abs(wrong.mean(axis=0)).max() < 0.003 * stance[:, 1].mean()
     slope = np.gradient(stance[:, 1], 1.0 / POINTS)
@@ -848,31 +848,31 @@ OFF = {
     "model, noise_n",
     [("clearance", 3.0), ("clearance", 15.0), pytest.param("full", 3.0, marks=pytest.mark.slow)],
 )
-def test_it_carries_and_wears_as_the_leg_that_bears_it(leg, twin, gait, stance, model, noise_n):
+def test_it_carries_and_wears_as_the_leg_that_bears_it(leg, loaded_twin, gait, stance, model, noise_n):
     """The sensor has 1 % or 5 % of noise. In the air the ankle carries an eighth, and wears a third as fast.
 
     Noise of 5 %, unfiltered, wears joint J 3.7 times as fast.
     """
     force_off, *archard_off = OFF[model, noise_n]
     bias, sigma = np.array(archard_off)
-    cycles = twin.update(pushed(gait(15.0), stance, 200.0, noise_n)).cycles[2:]
+    cycles = loaded_twin.update(pushed(gait(15.0), stance, 200.0, noise_n)).cycles[2:]
     mean_n, archard_j = (
         np.mean([getattr(cycle, name) for cycle in cycles], axis=0) for name in ("mean_force_n", "archard_j")
     )
     truth = lw.simulate(with_toe_force(leg, stance[:: POINTS // 128]), cycles=12, model=model, wear=True)
-    joints = [truth.joints[name] for name in twin.clearance_joints]
+    joints = [truth.joints[name] for name in loaded_twin.clearance_joints]
     np.testing.assert_allclose(mean_n, [joint.mean_force_n for joint in joints], rtol=force_off)
     wrong = archard_j / [joint.archard_integral_j_per_cycle for joint in joints] - 1.0
     assert (np.abs(wrong) < 0.01 + bias + 5.3 * sigma).all(), wrong
     assert cycles[-1].torque.load_acting_n == 0.0
 
 
-def test_a_row_that_no_sample_reaches_keeps_the_force_of_the_cycle_before(twin, gait, stance):
+def test_a_row_that_no_sample_reaches_keeps_the_force_of_the_cycle_before(loaded_twin, gait, stance):
     walk = pushed(gait(4.0), stance, 200.0)
     since_s = 1.0e-9 * (walk["stamp_ns"] - walk["stamp_ns"][0])
     lost = (walk["kind"] == LOAD) & (since_s > 2.5) & (since_s < 2.8)
-    cycles = twin.update(walk[~lost]).cycles
-    assert np.abs(twin._load.acting_n - stance).mean() < 2.0e-3 * PEAK_N
+    cycles = loaded_twin.update(walk[~lost]).cycles
+    assert np.abs(loaded_twin._load.acting_n - stance).mean() < 2.0e-3 * PEAK_N
     assert [cycle.load.gap_s for cycle in cycles] == pytest.approx([0.0, 0.305], abs=0.006)
     assert cycles[-1].load_peak_n == pytest.approx(PEAK_N, rel=0.03)
 
@@ -905,11 +905,11 @@ def test_blocks_change_nothing(leg, gait, stance):
     np.testing.assert_array_equal(seen[0][2], seen[1][2])
 
 
-def test_other_parameters_leave_the_force_where_it_is(twin, gait, stance):
+def test_other_parameters_leave_the_force_where_it_is(loaded_twin, gait, stance):
     walk = pushed(gait(3.0), stance, 200.0)
-    twin.update(walk)
-    before = [table.copy() for table in twin._load.tables]
+    loaded_twin.update(walk)
+    before = [table.copy() for table in loaded_twin._load.tables]
     estimated = stance[:: POINTS // PHASES]  # the diagnosis knows the load from the torque
-    twin.set_parameters(attrs.evolve(twin.parameters, friction=1.5, load=estimated))
-    for table, wanted in zip(twin._load.tables, before, strict=True):
+    loaded_twin.set_parameters(attrs.evolve(loaded_twin.parameters, friction=1.5, load=estimated))
+    for table, wanted in zip(loaded_twin._load.tables, before, strict=True):
         np.testing.assert_allclose(table, wanted, rtol=1.0e-6, atol=1.0e-9)

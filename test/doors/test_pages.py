@@ -3,22 +3,41 @@
 Headless Chromium lays out all pages in frames of two widths, a script tries them and leaves what it found.
 """
 
-import attrs
+import json
+from pathlib import Path
+
 import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS, browse, printed
-from made_up_summary import made_up_summary
 from matplotlib.figure import Figure
+from mechanism_of import document_of, write_mechanism
 
-from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
-from leg_wear_monitor.mechanism.reach import findings, reach_of
-from leg_wear_monitor.report.drawing import drawing_html
-from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.report.replay.page import replay_page
-from leg_wear_monitor.report.study_page import study_page
+import leg_wear_monitor as lw
 
 pytestmark = NEEDS_CHROMIUM
 
-STUDIES = ("size", "speed", "location", "multi", "laws", "load", "wear", "chaos")
+SMALL = {
+    "ensemble": {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1},
+    "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
+    "section": {"cycles": 4, "skip_cycles": 1},
+    "portrait": {"cycles": 6, "skip_cycles": 1, "portrait_cycles": 2},
+}
+TINY = {
+    "size": [{"clearance_m": [1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4]}],
+    "speed": [{"speed_rpm": [45, 60]}],
+    "location": [{"clearances": [["A", "B"], ["G"]]}],
+    "multi": [
+        {"clearances": [["A", "B"], ["G"], ["I", "J"], ["A", "B", "I", "J"], ["A", "B", "G", "I", "J"]]}
+    ],
+    "laws": [{"normal_law": ["hertz", "flores"]}, {"friction": ["none"]}, {"friction_coefficient": [0.1]}],
+    "load": [{"ground_n": [0, 300], "keep": ["response", "exponent"]}],
+    "wear": [{"clearances": [["I", "J"]]}],
+    "chaos": [
+        {"keep": ["response", "portrait"]},
+        {"clearances": [["A", "B"], ["G"]], "keep": ["exponent"]},
+        {"clearance_m": [2.0e-4, 3.0e-4], "keep": ["section"]},
+        {"speed_rpm": [20, 60], "keep": ["section"]},
+    ],
+}
 
 TRY = """
 function look(frame) {
@@ -69,18 +88,34 @@ def paint_blank(figure, *arguments, paint=Figure.savefig, **options):
     paint(figure, *arguments, **options)
 
 
-@pytest.fixture(
-    scope="module", params=[("location",), pytest.param(STUDIES, marks=pytest.mark.slow)], ids=len
-)
-def seen(request, study, tmp_path_factory):
+def page_of(directory: Path) -> str:
+    return (directory / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module", params=[("location",), pytest.param(TINY, marks=pytest.mark.slow)], ids=len)
+def seen(request, run, tmp_path_factory):
     """By name of the study and width."""
-    names = [(name, width) for name in request.param for width in WIDTHS]
+    home, pages = tmp_path_factory.mktemp("studies"), []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", paint_blank)
-        pages = [page_html(study_page(study(name))) for name in request.param]
-    found, console = browse(pages, tmp_path_factory.mktemp("browser"), TRY)
+        for name in request.param:
+            document = {"title": name, "question": f"{name}?", "clearances": ["G"], "sweeps": TINY[name]}
+            (home / f"{name}.yaml").write_text(json.dumps(document | SMALL))
+            done = run("study", home / f"{name}.yaml", "--out", home / name, "--workers", 1)
+            assert done.code == 0, done.err
+            pages.append(page_of(home / name))
+    found, console = browse(pages, home, TRY)
     assert console == []
-    return dict(zip(names, found, strict=True))
+    return dict(zip([(name, width) for name in request.param for width in WIDTHS], found, strict=True))
+
+
+@pytest.fixture(scope="module")
+def replay_page(run, tmp_path_factory) -> str:
+    """Page of a leg whose knee breaks out."""
+    bag, out = lw.share_directory() / "bags" / "knocking", tmp_path_factory.mktemp("replay") / "out"
+    done = run("replay", f"{bag}.mcap", "--config", f"{bag}.yaml", "--out", out)
+    assert done.code == 0, done.err
+    return page_of(out)
 
 
 def test_figures_and_tables_are_there_and_fit(seen):
@@ -91,17 +126,21 @@ def test_figures_and_tables_are_there_and_fit(seen):
         assert found["overflow"] <= 0, at
 
 
-def test_the_page_of_a_mechanism_moves_and_fits(document, tmp_path):
+def test_the_page_of_a_mechanism_moves_and_fits(run, tmp_path):
     """One that turns, one that rocks, one that is open, one that does not move."""
-    rocking, open_, free = document("four_bar"), document("four_bar"), document("four_bar")
+    turning, rocking, open_, free = (document_of("four_bar") for _ in range(4))
     rocking["bodies"]["coupler"]["points"]["C"] = [0.13, 0.0]
     rocking["bodies"]["rocker"]["points"]["C"] = [0.1, 0.0]
     open_["bodies"]["coupler"]["points"]["C"] = [0.5, 0.0]
     del free["joints"]["C"], free["clearances"]
-    mechanisms = [parse_mechanism(each, "edited.yaml") for each in (rocking, open_, free)]
-    reaches = list(map(reach_of, (load_mechanism("four_bar"), *mechanisms)))
-    assert [bool(findings(reach)) for reach in reaches] == [False, True, True, True]
-    found, console = browse(list(map(drawing_html, reaches)), tmp_path, TRY)
+    codes, pages = [], []
+    for number, document in enumerate((turning, rocking, open_, free)):
+        file, page = tmp_path / f"{number}.yaml", tmp_path / f"{number}.html"
+        write_mechanism(document, file)
+        codes.append(run("draw", file, "--out", page).code)
+        pages.append(page.read_text(encoding="utf-8"))
+    assert codes == [0, 1, 1, 1]
+    found, console = browse(pages, tmp_path, TRY)
     assert console == []
     for page in found:
         assert page["overflow"] <= 0
@@ -128,10 +167,8 @@ window.addEventListener("load", () => setTimeout(() => {
 """
 
 
-def test_codes_of_a_guide_are_whole(tmp_path):
-    summary = made_up_summary()
-    summary = attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, fault_code="CLEARANCE_DETECTED_A"))
-    found, _ = browse([page_html(replay_page(summary))], tmp_path, CUT)
+def test_codes_of_a_guide_are_whole(replay_page, tmp_path):
+    found, _ = browse([replay_page], tmp_path, CUT)
     assert all(page["words"] >= 4 for page in found)
     assert [page["cut"] for page in found] == [0, 0]
 
@@ -145,14 +182,6 @@ def test_what_is_wrong_would_be_seen(tmp_path):
     assert any("nothing is not defined" in said for said in console)
 
 
-def test_the_page_of_a_leg_is_printed_on_two_sheets(tmp_path):
-    """With five joints and a long verdict; what is folded would need seven more."""
-    joints, summary = tuple("ABGIJ"), made_up_summary()
-    summary = attrs.evolve(
-        summary,
-        monitor=attrs.evolve(summary.monitor, clearance_joints=joints),
-        verdict=attrs.evolve(summary.verdict, why=40 * "why ", do=60 * "do "),
-        joints=dict.fromkeys(joints, summary.joints["A"]),
-        clearances=dict.fromkeys(joints, summary.clearances["A"]),
-    )
-    assert printed(page_html(replay_page(summary)), tmp_path) == 2
+def test_the_page_of_a_leg_is_printed_on_two_sheets(replay_page, tmp_path):
+    """With five joints; what is folded would need seven more."""
+    assert printed(replay_page, tmp_path) == 2

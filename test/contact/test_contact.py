@@ -11,7 +11,6 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from counted_run import counted
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
@@ -41,9 +40,6 @@ from leg_wear_monitor.contact.laws import (
     softening,
     threlfall_ramp,
 )
-from leg_wear_monitor.dynamics.clearance.stepper import ClearanceRun
-from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import ARCHARD, CONTACT, FORCE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism import FRICTION_LAWS, NORMAL_LAWS
@@ -384,57 +380,6 @@ def test_hertz_s_stiffness_is_refused():
         ConfigError, match=r"clearances\.joints\.B\.stiffness: 6\.6102e\+10 N/m\^1\.5 is for Hertz"
     ):
         prepare(load_mechanism("slider_crank"), normal_law="winkler")
-
-
-def moved(model, leg, clearance_joints, cycles, wear=False, pace=1.0):
-    """Cycles of the leg after its first: integrals (cycles, k, ...), energy balances, wear depth."""
-    worn = {
-        name: attrs.evolve(c, wear_coefficient=tuple(pace * k for k in c.wear_coefficient))
-        for name, c in leg.clearances.items()
-    }
-    mechanism = attrs.evolve(leg, clearances=worn)
-    setup = prepare(mechanism, clearances=tuple(clearance_joints), wear=wear, normal_law="winkler")
-    run = model(setup)
-    run.advance(1.0, new_run_statistics(len(leg.joints)))
-    found = [counted(run, 0.0, 2.0 + cycle) for cycle in range(cycles)]
-    integrals = np.array([statistics.integral[setup.contacts.joint] for statistics, _ in found])
-    return integrals, [energy for _, energy in found], setup.surfaces.depth
-
-
-@pytest.mark.chaotic
-@pytest.mark.parametrize("model, cycles, bound", [(FullRun, 1, 2.0e-4), (ClearanceRun, 2, 2.0e-2)])
-def test_energy_adds_up_on_walls_that_wear(leg, model, cycles, bound):
-    """At 3e4 times the pace of real wear.
-
-    Penetrations are far below Hertz's, so the clearance model's local error makes more of them: 0.8 % of the
-    losses once; on fresh walls 0.7 %, and 0.1 % at a tenth of the tolerance. Off by 2.8e-5, sigma 2.6e-5, and
-    by -0.0111, sigma 0.0013 (10 starts moved by 1e-12, 2026-11-23).
-    """
-    _, energy, depth = moved(model, leg, "ABGIJ", cycles, wear=True, pace=3.0e4)
-    losses = sum(cycle.friction_loss + cycle.contact_loss for cycle in energy)
-    assert sum(cycle.wear_loss for cycle in energy) > 2.5e-3 * losses  # least: 8.6e-3, sigma 1.1e-3
-    assert abs(sum(cycle.residual for cycle in energy)) < bound * losses
-    assert (depth.max(axis=2) > 0.0).all()  # every bushing and journal
-
-
-# Largest relative deviation of the clearance model's means over 40 cycles from those of full coordinates over
-# 6, of joints A and B. With its mean and sigma: 32 starts moved by 1e-12, 2026-11-23; bound 5.3 sigma off.
-# Forces' squares are left out: 0.03 and 0.08 with a sigma of 0.06 and 0.10 say nothing.
-DEVIATION = {
-    FORCE: (0.017, 0.012),  # -0.0068, 0.0017; -0.0048, 0.0012
-    CONTACT: (0.14, 0.14),  # -0.041, 0.017; -0.049, 0.016: penetrations are small beside the step's error
-    ARCHARD: (0.035, 0.21),  # -0.0081, 0.0045; -0.013, 0.034
-}
-
-
-@pytest.mark.slow
-@pytest.mark.chaotic
-def test_both_formulations_have_the_same_means(leg):
-    full = moved(FullRun, leg, "AB", 6)[0].mean(axis=0)
-    clearance = moved(ClearanceRun, leg, "AB", 40)[0].mean(axis=0)
-    for column, bound in DEVIATION.items():
-        off = clearance[:, column] / full[:, column] - 1.0
-        assert (np.abs(off) < bound).all(), (column, off)
 
 
 # Contact beyond Hertz: how wide its arc is, and what is said of it.

@@ -1,5 +1,6 @@
 """Inputs of a healthy leg whose sensors or drivers fail: the input is named, and no joint is accused."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -141,6 +142,23 @@ CASES: dict[str, tuple[Callable[[Walk], Walk], str]] = {
     "none": (lambda walk: walk, "NONE"),
 }
 
+# What the sentence of a case says, and the numbers in it by the way in which the case was made.
+NUMBERS: dict[str, tuple[str, tuple[float, ...]]] = {
+    "constant": (r"stays at ([\d.]+) N m", (3.7,)),
+    "saturated": (r"range .* \(([\d.]+) N m\)", (5.0,)),
+    "torque held": (r"every ([\d.]+)th sample, at ([\d.]+) Hz", (8.0, 25.0)),
+    "1e300": (r"^([\d.]+) % of the drive torques are spikes", (8.0,)),
+    "every second is NaN": (r"(\d+) of .* infinite \((\d+) of drive_torque\)", (102.0, 102.0)),
+    "arrival 1 ms": (r"scatter by ([\d.]+) ms \((\d+) % of the sampling period", (1.0, 20.0)),
+    "coarse clock": (
+        r"scatter by ([\d.]+) ms \((\d+) % of the sampling period",
+        (2.89, 58.0),
+    ),  # 10 / sqrt 12
+    "held": (r"every ([\d.]+)th sample, at ([\d.]+) Hz", (10.0, 20.0)),
+    "jump": (r"jumped by (\d+) mrad", (250.0 * TURN,)),
+    "turns": (r"at ([\d.]+) of the commanded cadence: its unit seems to be turns", (1.0 / TURN,)),
+}
+
 
 def starts(standing_s: float) -> Callable[[Walk], Walk]:
     """A function that lets the leg stand before it walks."""
@@ -195,6 +213,10 @@ def test_the_input_is_named_and_no_joint_is_accused(leg: lw.Mechanism, walk: Wal
     verdict = monitor.state.verdict
     assert (verdict.fault_code, verdict.joints) == (code, ())
     assert verdict.state.value not in ("stop", "inspect")
+    if case in NUMBERS:
+        pattern, numbers = NUMBERS[case]
+        said = re.search(pattern, verdict.why)
+        assert said and list(map(float, said.groups())) == pytest.approx(numbers, rel=0.15), verdict.why
     if case == "1e300":
         assert monitor.lost.torque_outliers > 50
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level.name == "ERROR"]

@@ -47,21 +47,28 @@ def test_energy_in_clearance_coordinates(leg, case: str) -> None:
     assert energy.contact_loss > 0.0
 
 
-@pytest.mark.chaotic
-@pytest.mark.parametrize(("model", "bound"), [("full", 1.0e-4), ("clearance", 2.0e-3)])
-def test_walls_that_wear_away_take_energy_along(leg, model: str, bound: float) -> None:
-    """At 3e4 times the pace of real wear.
+# Model, normal law, gait cycles, bound of the residual over the losses, least wear loss over the others. Mean
+# and sigma of the residual: 7e-6, 3e-6; -1.5e-4, 3.1e-4; by Winkler's law, of far smaller penetrations,
+# 2.8e-5, 2.6e-5; -0.0111, 0.0013 (10 starts moved by 1e-12, 2026-11-23).
+WEARING = [
+    ("full", None, 2, 1.0e-4, 4.0e-3),
+    ("clearance", None, 8, 2.0e-3, 4.0e-3),
+    ("full", "winkler", 1, 2.0e-4, 2.5e-3),
+    ("clearance", "winkler", 2, 2.0e-2, 2.5e-3),
+]
 
-    The residual is 7e-6 with a sigma of 3e-6, and -1.5e-4 with 3.1e-4 (10 starts moved by 1e-12, 2026-11-23).
-    """
+
+@pytest.mark.chaotic
+@pytest.mark.parametrize(("model", "law", "cycles", "bound", "least"), WEARING)
+def test_walls_that_wear_away_take_energy_along(leg, model, law, cycles, bound, least) -> None:
+    """At 3e4 times the pace of real wear."""
     clearances = {
         name: attrs.evolve(each, wear_coefficient=tuple(3.0e4 * k for k in each.wear_coefficient))
         for name, each in leg.clearances.items()
     }
     fast = attrs.evolve(leg, clearances=clearances)
-    cycles = 2 if model == "full" else 8
-    energy = lw.simulate(fast, model=model, wear=True, cycles=cycles).energy_j
-    assert energy.wear_loss > 4.0e-3 * (energy.friction_loss + energy.contact_loss)
+    energy = lw.simulate(fast, model=model, normal_law=law, wear=True, cycles=cycles).energy_j
+    assert energy.wear_loss > least * (energy.friction_loss + energy.contact_loss)
     assert closes(energy, bound)
 
 

@@ -55,6 +55,22 @@ SERVICES = {
 PARAMETERS = {"diagnosis.enabled": "false", "wear_acceleration": "1.0e5"}
 PARAMETERS |= {"table.rate_hz": "100.0"}  # a parameter file may have it for replay; the node takes no notice
 
+MEASURED = {"joint": "G", "clearance_m": 9.0e-4, "sigma_m": 5.0e-6}
+NOT_MEASURED = {
+    "unknown joint": (
+        MEASURED | {"joint": "Q"},
+        "'Q' is not a clearance joint. Expected one of A, B, G, I, J",
+    ),
+    "in mm": (MEASURED | {"clearance_m": 0.9}, "did you mean 0.9 mm?"),
+    "unknown": (MEASURED | {"sigma": 1.0}, "sigma: unknown parameter. Expected joint, clearance_m, sigma_m"),
+    "missing": ({"joint": "G", "clearance_m": 9.0e-4}, "sigma_m: is missing. Expected a double"),
+    "of a different type": (
+        MEASURED | {"clearance_m": 1},
+        "clearance_m: is of type integer. Expected a double",
+    ),
+    "twice": (MEASURED, "joint: is given twice"),
+}
+
 
 class Person:
     """Somebody who sends what sensors would send, and who hears and calls a node."""
@@ -193,12 +209,8 @@ def scene(leg, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
                 SetParameters, f"{LEFT}/set_parameters", parameters=to_set(**values)
             ).results
             found.answers[key] = answer
-        wide = {"joint": "G", "clearance_m": 9.0e-4, "sigma_m": 5.0e-6}
-        for key, values in {
-            "measured": wide | {"accept": True}, "unknown joint": wide | {"joint": "Q"},
-            "in mm": wide | {"clearance_m": 0.9},
-        }.items():  # fmt: skip
-            request = to_set(**values)
+        for key, (values, _) in ({"measured": (MEASURED | {"accept": True}, "")} | NOT_MEASURED).items():
+            request = to_set(**values) + (to_set(joint="G") if key == "twice" else [])
             found.answers[key] = person.call(
                 SetParametersAtomically, f"{LEFT}/measure", parameters=request
             ).result
@@ -288,8 +300,8 @@ def test_parameters_are_listed_and_set_and_wrong_ones_are_refused_in_one_line(sc
 def test_an_operator_measures_replaces_and_acknowledges(scene: Scene) -> None:
     answers, monitor = scene.answers, scene.home / "left.ledger"
     assert answers["measured"].successful
-    for key, word in (("unknown joint", "Q"), ("in mm", "0.9 mm")):
-        assert not answers[key].successful and word in answers[key].reason
+    for key, (_, words) in NOT_MEASURED.items():
+        assert not answers[key].successful and words in answers[key].reason, key
     assert not answers["first"].success
     for name in ("reset_wear/G", "undo_reset/G", "acknowledge_alarms", "save_state"):
         assert answers[name].success, answers[name].message

@@ -45,6 +45,8 @@ def test_backwards_the_ideal_trace_runs_backwards(leg):
     assert back.speed_rpm == pytest.approx(-60.0)
     assert back.trace.crank_angle_rad == pytest.approx(-forth.trace.crank_angle_rad)
     assert back.trace.toe_x_m[1:] == pytest.approx(forth.trace.toe_x_m[:0:-1])
+    for joint in leg.joints:
+        assert back.trace.force_n[joint][1:] == pytest.approx(forth.trace.force_n[joint][:0:-1])
 
 
 def test_backwards_with_clearances(leg):

@@ -235,6 +235,26 @@ def test_a_measured_clearance_beyond_its_limit_keeps_its_alarm_while_the_leg_wal
     assert (alarm.present, alarm.value) == (2, 3.0e-3)
 
 
+@pytest.mark.parametrize(
+    ("joint", "clearance_m", "sigma_m", "said"),
+    [
+        ("g", 9.0e-4, 5.0e-6, "'g' is not a clearance joint. Expected one of A, B, G, I, J; did you mean G?"),
+        ("G", 4.2e-7, 5.0e-6, "0.00042 mm is not between 0.003 mm, 1 % of the new clearance of joint G"),
+        ("G", -1.0, 5.0e-6, "-1000 mm is not between"),
+        ("G", np.nan, 5.0e-6, "nan mm is not between"),
+        ("G", 9.0e-4, 0.0, "0 mm is not a standard deviation from 0.0001 mm to 0.9 mm"),
+        ("G", 9.0e-4, np.nan, "nan mm is not a standard deviation"),
+        ("G", 9.0e-4, 1.0e-2, "10 mm is not a standard deviation from 0.0001 mm to 0.9 mm"),
+    ],
+)
+def test_a_clearance_that_cannot_be_measured_is_refused(
+    monitor_of, joint, clearance_m, sigma_m, said
+) -> None:
+    with pytest.raises(lw.ConfigError) as refused:
+        monitor_of().measure(joint, clearance_m, sigma_m, START_NS, "ann")
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
 def test_counts_of_an_encoder_are_read_as_its_angle(parameters) -> None:
     counts, per_turn = np.arange(600) * 4096 // RATE_HZ, 4096
     columns = {"time": np.arange(600) / RATE_HZ, "drive_torque": np.zeros(600)}

@@ -529,7 +529,12 @@ def torque_by_phase(run: ClearanceRun | FullRun, cycles: int) -> np.ndarray:
 
 @pytest.mark.chaotic
 @pytest.mark.parametrize(
-    "stiffness, bound", [(200.0, 0.017), pytest.param(1000.0, 0.006, marks=pytest.mark.slow), (5000.0, 0.004)]
+    "stiffness, bound",
+    [
+        (200.0, 0.017),
+        pytest.param(1000.0, 0.006, marks=pytest.mark.slow),
+        pytest.param(5000.0, 0.004, marks=pytest.mark.slow),
+    ],
 )
 def test_the_work_of_the_drive_is_lost_in_the_joints_alone(leg, stiffness, bound):
     """A coupling without damper only stores energy; with 16 parts of an interval, not 4 as usual.
@@ -546,6 +551,7 @@ def test_the_work_of_the_drive_is_lost_in_the_joints_alone(leg, stiffness, bound
     assert abs(energy.residual) < bound * (energy.friction_loss + energy.contact_loss)
 
 
+@pytest.mark.slow  # energy and full coordinates hold for a coupling in `make test`
 @pytest.mark.chaotic
 def test_a_stiff_coupling_is_a_rigid_drive(leg):
     """RMS difference from the mean torque of a rigid drive: 7.66 N m with a sigma of 0.03, and 1.06 and 0.17.

@@ -481,14 +481,6 @@ def test_work_of_the_drive_is_the_change_of_energy(leg_linkage):
     np.testing.assert_allclose(np.fft.irfft(spectrum), motion.drive_torque, atol=1.0e-8)
 
 
-def test_backwards_is_the_same_positions_and_forces(leg_linkage, cycle):
-    back = one_cycle(leg_linkage, 36, -SPEED)
-    np.testing.assert_array_equal(back.q, cycle.q)
-    np.testing.assert_array_equal(back.v, -cycle.v)
-    np.testing.assert_allclose(back.a, cycle.a, atol=1.0e-10)
-    np.testing.assert_allclose(back.joint_force, cycle.joint_force, atol=1.0e-10)
-
-
 def test_inertia_forces_grow_with_the_square_of_speed(leg):
     linkage = build_linkage(attrs.evolve(leg, gravity=(0.0, 0.0)))
     slow, fast = (one_cycle(linkage, 8, speed) for speed in (SPEED, 3.0 * SPEED))

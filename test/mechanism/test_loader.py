@@ -54,24 +54,26 @@ def test_whatever_a_file_holds_instead_is_told_in_one_line(junk):
         mechanism_of(junk)
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        "bodies.rocker",
-        "joints.A",
-        "drive",
-        "clearances",
-        "clearances.defaults",
-        "clearances.defaults.friction",
-    ],
+LOADED = changed(
+    document_of("four_bar"), ("loads",), {"tip": {"body": "coupler", "point": "toe", "force": [0, 1]}}
 )
+LOADED["springs"] = {
+    "back": {"bodies": ["ground", "rocker"], "points": ["A", "C"], "stiffness": 1.0, "free_length": 0}
+}
+LOADED["clearances"]["joints"] = {"B": {"restitution": 0.8}}
+KEYS = ("", "ground", "bodies.rocker", "joints.A", "drive", "loads.tip", "springs.back", "clearances")
+KEYS += ("clearances.defaults", "clearances.defaults.friction", "clearances.joints.B")
+
+
+@pytest.mark.parametrize("path", KEYS)
 def test_a_key_that_is_not_known_is_never_passed_over(path):
     """Whatever its value is."""
-    original = document_of("four_bar")
+    assert isinstance(mechanism_of(LOADED), lw.Mechanism)
+    place = (*filter(None, path.split(".")), "colour")
     for value in (None, 1.0, "red", [], {"red": 1}):
         with pytest.raises(lw.ConfigError) as caught:
-            mechanism_of(changed(original, (*path.split("."), "colour"), value))
-        assert caught.value.key == f"{path}.colour"
+            mechanism_of(changed(LOADED, place, value))
+        assert caught.value.key == ".".join(place)
         assert caught.value.fault.startswith("unknown key")
 
 

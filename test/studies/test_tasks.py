@@ -28,7 +28,7 @@ from leg_wear_monitor.studies.tasks import (
 )
 from leg_wear_monitor.wear import BUSHING
 
-# The exponent's code gives what is known: maps, a bouncing ball; calm legs differ from wild ones.
+# The exponent's code gives what is known: maps, a flow, a bouncing ball; calm legs differ from wild ones.
 
 
 def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, distance=1.0e-9):
@@ -43,6 +43,25 @@ def measured(advance, starts, steps, step_time=1.0, skip=50, comparable=None, di
 
 def agrees(estimate, value, within=0.0):
     return abs(estimate.value - value) < 4.0 * estimate.error + within
+
+
+def test_lorenz_s_flow():
+    """0.9056, e.g. Sprott, Chaos and Time-Series Analysis, 2003; Runge and Kutta's fourth order."""
+
+    def field(p):
+        x, y, z = p
+        return np.array([10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z])
+
+    def advance(p, h=0.01):
+        for _ in range(5):
+            a = field(p)
+            b = field(p + 0.5 * h * a)
+            c = field(p + 0.5 * h * b)
+            p = p + h / 6.0 * (a + 2.0 * b + 2.0 * c + field(p + h * c))
+        return p
+
+    estimate = measured(advance, [[1.0, 1.0, 20.0], [-4.0, 2.0, 25.0], [5.0, 3.0, 30.0]], 1600, 0.05, 200)
+    assert agrees(estimate, 0.9056, 0.01)
 
 
 def test_a_ball_that_bounces_on_a_shaking_table():

@@ -32,7 +32,7 @@ from leg_wear_monitor.mechanism.person import (
     with_toe_force,
 )
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, one_cycle
-from leg_wear_monitor.twin import CRANK, LOAD, TORQUE
+from leg_wear_monitor.twin import LOAD, TORQUE
 from leg_wear_monitor.twin.crank_motion import (
     EVALUATE,
     LEAVE,
@@ -400,46 +400,6 @@ def test_a_fifth_of_the_samples_may_be_nonsense(gait):
     off = angle - TURN * time - 0.5
     assert np.abs(off - TURN * np.round(off / TURN)).max() < 0.15
     assert np.abs(speed / TURN - 1.0).max() < 0.5
-
-
-_WEIRD = st.sampled_from([0.0, 1.0, -7.0, np.nan, np.inf, -np.inf, 1.0e300, -1.0e300, 1.0e6, 5.0e-324])
-
-
-@settings(max_examples=200)
-@given(
-    rows=st.lists(
-        st.tuples(
-            st.integers(-5, 400) | st.sampled_from([-(2**62), 2**62]),
-            st.integers(0, 3),
-            st.sampled_from([0, 0, 0, 1, 8, 255]),
-            _WEIRD | st.floats(0.0, TURN),
-            _WEIRD,
-            _WEIRD,
-        ),
-        max_size=60,
-    )
-)
-def test_no_sequence_of_samples_breaks_it(rows):
-    """Every sample is counted once; what comes out is finite, in order, and joins up."""
-    samples = gait_samples(np.zeros(len(rows), dtype=np.int64))
-    for sample, (stamp, kind, fault, *values) in zip(samples, rows, strict=True):
-        sample["stamp_ns"] = START_NS + 10_000_000 * stamp if abs(stamp) < 1000 else max(stamp, -1)
-        sample["kind"], sample["fault"] = kind, fault
-        sample["crank_angle_rad"], sample["crank_velocity_radps"], sample["torque_nm"] = values
-    tracker = CrankTracker(TrackerSettings())
-    steps = track([samples], tracker)
-    assert np.isfinite(steps.steps["motion"]).all()
-    moves = steps.of(MOVE)
-    assert (moves["begin_ns"] < moves["end_ns"]).all()
-    counts, clock = tracker.state.counts, tracker.state.clock
-    dropped = counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
-    settled = counts.used[CRANK] + dropped + counts.faults.sum()
-    assert counts.received == len(rows)
-    waiting = clock.waiting + (tracker.state.candidate.stamp_ns != 0)
-    torques = len(rows) - (settled + waiting)
-    # a crank sample may bring a torque, which counts as one, too
-    brought = np.isfinite(samples["torque_nm"]) & (samples["kind"] == CRANK)
-    assert 0 <= torques <= counts.used[TORQUE] <= torques + min(counts.used[CRANK], brought.sum())
 
 
 # How a crank turns, found again from samples of its angle.
@@ -890,19 +850,6 @@ def test_a_force_along_the_axes_of_the_foot_is_turned(leg, gait, stance):
     cycle = twin.update(pushed(gait(3.0), of_foot, 200.0)).cycles[-1]
     assert np.abs(twin._load.acting_n - stance).mean() < 2.0e-3 * PEAK_N
     assert cycle.load.largest_n == pytest.approx(PEAK_N, rel=0.01)
-
-
-def test_blocks_change_nothing(leg, gait, stance):
-    walk, seen = pushed(gait(2.7), stance, 250.0), []
-    for split in ([], range(1, len(walk), 37)):
-        twin = DigitalTwin(leg, MEASURED)
-        cycles = [one for block in np.split(walk, split) for one in twin.update(block).cycles]
-        seen.append((cycles, twin.depth, twin._load.acting_n))
-    for one, other in zip(seen[0][0], seen[1][0], strict=True):
-        np.testing.assert_array_equal(one.archard_j, other.archard_j)
-        np.testing.assert_array_equal(one.load.force_n, other.load.force_n)
-    np.testing.assert_array_equal(seen[0][1], seen[1][1])
-    np.testing.assert_array_equal(seen[0][2], seen[1][2])
 
 
 def test_other_parameters_leave_the_force_where_it_is(loaded_twin, gait, stance):

@@ -247,15 +247,12 @@ def test_without_encoders_there_is_nothing_new(monitor, gait):
 # Clearances from encoders: what is put into angles is found again, and what cannot be seen is said.
 
 
-SENSORS = ("B", "G", "I")  # hip, knee, ankle
-FRESH_M = np.full(5, 3e-4)
-UNKNOWN = errors_of(Encoders(names=("hip", "knee", "ankle"), joints=SENSORS), None)
-TRUE_ERRORS = np.array([1e-3, 0.01, -0.02, 0.015, 2e-3, -1e-3, 3e-3])  # crank's offset, offsets, scales
+UNKNOWN = errors_of(Encoders(names=NAMES, joints=JOINTS), None)
 
 
 @pytest.fixture(scope="module")
 def model(leg):
-    return angle_model(leg, SENSORS)
+    return angle_model(leg, JOINTS)
 
 
 @pytest.fixture(scope="module")
@@ -270,18 +267,18 @@ def shape():
 def simulated_reference(model, shape):
     """Of a leg that obeys the linear model, so well known as if from any number of gait cycles."""
     columns = angle_columns(model, shape)
-    return AngleReference(FRESH_M, columns[:, :, :5] @ FRESH_M, columns, 10**9, CrankProfile.steady(TURN))
+    return AngleReference(FRESH, columns[:, :, :5] @ FRESH, columns, 10**9, CrankProfile.steady(TURN))
 
 
 @pytest.fixture(scope="module")
 def simulated(leg, model):
     """A reference by simulation; of few gait cycles, for time."""
     run = AngleReferenceRun(leg, model, cycles=16)
-    run.begin(FRESH_M, np.zeros((5, 2, 720)))
+    run.begin(FRESH, np.zeros((5, 2, 720)))
     return run.finish()
 
 
-def read_cycle(model, shape, clearance, errors=TRUE_ERRORS, noise=0.0, seed=0, scatter=0.05):
+def read_cycle(model, shape, clearance, errors=ERRORS, noise=0.0, seed=0, scatter=0.05):
     """A cycle's samples of encoders on a leg that obeys the model, but for scatter of its clearances."""
     random = np.random.default_rng(seed)
     crank = (np.arange(PHASES) + 0.5) * (TURN / PHASES)
@@ -300,12 +297,12 @@ def watched(model, shape, simulated_reference, before, clearance, cycles=40, **m
 
 
 def observations(found):
-    return [one.observation for one in clearance_estimates(found, FRESH_M)]
+    return [one.observation for one in clearance_estimates(found, FRESH)]
 
 
 def others(found):
     """Joints that are reported as other than new."""
-    return [k for k, one in enumerate(clearance_estimates(found, FRESH_M)) if one.is_other]
+    return [k for k, one in enumerate(clearance_estimates(found, FRESH)) if one.is_other]
 
 
 WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
@@ -314,15 +311,15 @@ WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
 def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, simulated_reference, noise):
     found = watched(
-        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH_M, 3e-4), WORN, noise=noise
+        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, noise=noise
     ).fused()
     np.testing.assert_allclose(found.clearance_m, WORN, atol=1e-5 + 0.02 * noise)
-    np.testing.assert_allclose(found.mean[5:9], TRUE_ERRORS[:4], atol=2e-4 + noise)
+    np.testing.assert_allclose(found.mean[5:9], ERRORS[:4], atol=2e-4 + noise)
     assert (found.sigma_m < 3e-5 + 0.02 * noise).all()
 
 
 def test_outliers_do_no_harm(model, shape, simulated_reference):
-    hidden = ClearanceRegression(model, simulated_reference, prior_with(UNKNOWN, FRESH_M, 3e-4))
+    hidden = ClearanceRegression(model, simulated_reference, prior_with(UNKNOWN, FRESH, 3e-4))
     for seed in range(30):
         crank, angles = read_cycle(model, shape, WORN, seed=seed, noise=1e-4)
         angles[seed::20] += 0.5
@@ -332,7 +329,7 @@ def test_outliers_do_no_harm(model, shape, simulated_reference):
 
 def test_too_few_cycles_say_nothing(model, shape, simulated_reference):
     assert (
-        watched(model, shape, simulated_reference, prior_with(UNKNOWN, FRESH_M, 3e-4), WORN, cycles=5).fused()
+        watched(model, shape, simulated_reference, prior_with(UNKNOWN, FRESH, 3e-4), WORN, cycles=5).fused()
         is None
     )
 
@@ -341,7 +338,7 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, simulated_referen
     """What was known before stays, mean and deviation."""
 
     def by_hip(sigma_m):
-        hidden = ClearanceRegression(model, simulated_reference, prior_with(UNKNOWN, FRESH_M, sigma_m))
+        hidden = ClearanceRegression(model, simulated_reference, prior_with(UNKNOWN, FRESH, sigma_m))
         for seed in range(30):
             crank, angles = read_cycle(model, shape, WORN, seed=seed)
             angles[:, 1:] = np.nan
@@ -351,30 +348,30 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, simulated_referen
     expected = [ClearanceObservation.SEEN] * 3 + [ClearanceObservation.NOT_OBSERVABLE] * 2
     assert observations(by_hip(1e-3)) == expected
     found = by_hip(2e-5)
-    np.testing.assert_allclose(found.clearance_m[3:], FRESH_M[3:], atol=1e-9)
+    np.testing.assert_allclose(found.clearance_m[3:], FRESH[3:], atol=1e-9)
     np.testing.assert_allclose(found.sigma_m[3:], 2e-5, rtol=1e-3)
 
 
 def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape, simulated_reference):
     new = watched(
-        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH_M, 5e-6), FRESH_M, noise=1e-4
+        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH, 5e-6), FRESH, noise=1e-4
     ).fused()
-    before = prior_with(commissioned_errors(UNKNOWN, new), FRESH_M, 1e-4)
+    before = prior_with(commissioned_errors(UNKNOWN, new), FRESH, 1e-4)
     for k in range(5):
         worn = [4.5e-4 if j == k else 3e-4 for j in range(5)]
         assert others(watched(model, shape, simulated_reference, before, worn, noise=1e-4).fused()) == [k]
-    assert others(watched(model, shape, simulated_reference, before, FRESH_M, noise=1e-4).fused()) == []
+    assert others(watched(model, shape, simulated_reference, before, FRESH, noise=1e-4).fused()) == []
 
 
 def test_fusion_weighs_by_covariance(model, shape, simulated_reference):
     """A sure prediction moves little, an unsure one takes over what is seen."""
     sure = watched(
-        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH_M, 1e-7), WORN, scatter=0.2
+        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH, 1e-7), WORN, scatter=0.2
     ).fused()
     unsure = watched(
-        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH_M, 1e-3), WORN, scatter=0.2
+        model, shape, simulated_reference, prior_with(UNKNOWN, FRESH, 1e-3), WORN, scatter=0.2
     ).fused()
-    assert sure.clearance_m[2] == pytest.approx(FRESH_M[2], abs=1e-6)
+    assert sure.clearance_m[2] == pytest.approx(FRESH[2], abs=1e-6)
     assert unsure.clearance_m[2] == pytest.approx(WORN[2], abs=3e-5)
 
 
@@ -385,8 +382,8 @@ def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
     setup.contacts.clearance[setup.clearance_joints.index("G")] = 4.5e-4
     run, statistics = FullRun(setup, tolerance_m=1e-9), new_run_statistics(len(leg.joints))
     run.advance(1.0, statistics)
-    hidden = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH_M, 1e-3))
-    random, pairs = np.random.default_rng(1), [[names.index(b) for b in leg.sides(j)] for j in SENSORS]
+    hidden = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH, 1e-3))
+    random, pairs = np.random.default_rng(1), [[names.index(b) for b in leg.sides(j)] for j in JOINTS]
     for cycle in range(20):
         turned = []
         for sample in range(200):
@@ -407,8 +404,8 @@ def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, si
         simulated, deviation=simulated.deviation[:, :1], columns=simulated.columns[:, :1, own]
     )
     errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
-    alone = ClearanceRegression(hip, simulated_reference, prior_with(errors, FRESH_M, 1e-3))
-    absent = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH_M, 1e-3))
+    alone = ClearanceRegression(hip, simulated_reference, prior_with(errors, FRESH, 1e-3))
+    absent = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH, 1e-3))
     for seed in range(30):
         crank, angles = read_cycle(model, shape, WORN, seed=seed, noise=1e-4)
         alone.add(crank, angles[:, :1])

@@ -50,7 +50,7 @@ def whole(joints, settings=SETTINGS, observations=(), valid=True):
     coefficient_estimates = [
         estimate_coefficient(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)
     ]
-    return forecast(joints, coefficient_estimates, settings, cycle_s=1.0, valid=valid)
+    return forecast(joints, coefficient_estimates, settings, cycle_s=0.5, valid=valid)
 
 
 def alone(now=NOW, settings=SETTINGS, observations=(), **more):
@@ -64,7 +64,7 @@ def test_with_the_coefficient_alone_unknown_life_is_lognormal():
     spread = math.exp(Z * USUAL_SPREAD)
     assert result.cycles.p90 / result.cycles.p50 == pytest.approx(spread, rel=0.02)
     assert result.cycles.p50 / result.cycles.p10 == pytest.approx(spread, rel=0.02)
-    assert result.hours.p50 == pytest.approx(result.cycles.p50 / 3600.0)
+    assert result.hours.p50 == pytest.approx(0.5 * result.cycles.p50 / 3600.0)
 
 
 def test_what_is_not_known_adds_up_in_squares():

@@ -1,4 +1,4 @@
-"""The crank's zero is found from the torque's phase, or it is said why not; no sample is lost meanwhile."""
+"""The zero of the crank is found from the torque, or it is said why not; before, no sample is passed on."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.crank_zero import LEAST_TURNS, CrankZero
+from leg_wear_monitor.monitor.crank_zero import TURNS, CrankZero
 from leg_wear_monitor.monitor.evaluation import A_CYCLE, EvaluationPeriods
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import Samples
@@ -21,22 +21,25 @@ def off_rad(search: CrankZero, zero_rad: float) -> float:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_it_is_found_within_four_turns_and_no_sample_is_lost(seed: int, walk, new_search, feed) -> None:
+def test_it_is_found_within_four_turns_and_later_samples_have_it(seed: int, walk, new_search, feed) -> None:
     rng = np.random.default_rng(seed)
     rpm = float(rng.choice([-1.0, 1.0]) * rng.uniform(35.0, 90.0))
     zero, begin = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(0.0, 1.0))
-    seconds = (LEAST_TURNS + 1.0) * 60.0 / abs(rpm)
+    seconds = (TURNS[0] + 1.0) * 60.0 / abs(rpm)
     sent = walk(seconds, zero, rpm, begin, is_wrapped=bool(rng.integers(2)), seed=seed)
     search = new_search(float(round(rpm)))
     passed = feed(search, sent)
     assert off_rad(search, zero) < TOLERANCE_RAD
     assert search.zero is not None
-    assert search.zero.turns == LEAST_TURNS
+    assert search.zero.turns == TURNS[0]
     assert search.zero.sigma_rad >= TOLERANCE_RAD  # clearances shift the phase by as much
     assert search.cause == ""
-    assert search.unmonitored_s == 0.0
-    sent["crank_angle_rad"] += search.zero.offset_rad
-    assert passed.tobytes() == sent.tobytes()
+    later = sent[len(sent) - len(passed) :]
+    before_s = 1.0e-9 * (int(later["stamp_ns"][0]) - int(sent["stamp_ns"][0]))
+    assert search.unmonitored_s == pytest.approx(before_s, abs=0.01)
+    assert before_s < (TURNS[0] + 0.75) * 60.0 / abs(rpm)
+    later["crank_angle_rad"] += search.zero.offset_rad
+    assert passed.tobytes() == later.tobytes()
 
 
 @pytest.mark.parametrize(("stop", "cuts"), [(700, (1, 333)), (1300, ()), (1603, (1400, 1602))])
@@ -78,18 +81,18 @@ def symmetric(samples: Samples) -> Samples:
 
 
 UNTOLD = {
-    "no drive torque": (without_torque, 60.0, "there is no drive torque"),
-    "constant": (lambda one: with_torque(one, np.zeros_like), 60.0, "does not change"),
+    "no drive torque": (without_torque, 60.0, "had 0 samples in 3 turns"),
+    "constant": (lambda one: with_torque(one, np.zeros_like), 60.0, "did not change"),
     "noise": (
         lambda one: with_torque(one, lambda t: np.random.default_rng(2).standard_normal(len(t))),
         60.0,
-        "does not fit this leg",
+        "did not fit this leg",
     ),
-    "wrong sign": (lambda one: with_torque(one, np.negative), 60.0, "does not fit this leg"),
-    "symmetric": (symmetric, 60.0, "does not fit this leg|almost equally well"),
+    "wrong sign": (lambda one: with_torque(one, np.negative), 60.0, "did not fit this leg"),
+    "symmetric": (symmetric, 60.0, "did not fit this leg|almost equally well"),
     "few": (lambda one: np.delete(one, np.flatnonzero(one["kind"] != CRANK)[::10].repeat(9) + 2 * np.tile(
-        np.arange(1, 10), len(one) // 20)), 60.0, "samples in 4 turns"),
-    "standing": (standing, 60.0, "the leg stands"),
+        np.arange(1, 10), len(one) // 20)), 60.0, "samples in 3 turns"),
+    "standing": (standing, 60.0, "the leg walks at 0 rpm"),
     "another cadence": (lambda one: one, 80.0, "at 60 rpm; the commanded cadence is 80 ± 6 rpm"),
     "backwards": (lambda one: one, -60.0, "the leg walks at 60 rpm; the commanded cadence is -60 ± 6 rpm"),
 }  # fmt: skip
@@ -100,22 +103,21 @@ def test_where_it_cannot_be_told_it_is_said_why_and_found_later(name: str, walk,
     change, rpm, why = UNTOLD[name]
     search = new_search(rpm)
     periods = EvaluationPeriods(SECOND // A_CYCLE)
-    assert not len(feed(search, change(walk(4.5, 1.0)), (), periods))
+    assert not len(feed(search, change(walk(5.0, 1.0)), (), periods))
     assert search.zero is None
     assert any(each in search.cause for each in why.split("|")), search.cause
     if rpm == 60.0:
-        feed(search, walk(7.0, 1.0, begin_s=4.5), (), periods)
+        feed(search, walk(25.0, 1.0, begin_s=5.0), (), periods)
         assert off_rad(search, 1.0) < TOLERANCE_RAD
 
 
-def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(walk, new_search, feed) -> None:
+def test_samples_in_vain_are_bounded_and_not_monitored(walk, new_search, feed) -> None:
     search = new_search()
     periods = EvaluationPeriods(SECOND // A_CYCLE)
     feed(search, without_torque(walk(40.0, 1.0)), (), periods)
-    held = sum(len(part) for part in search.waiting)
-    assert held <= 21 * 200
+    assert sum(len(part) for part in search._samples) <= 1.5 * TURNS[-1] * 200
     assert search.unmonitored_s == pytest.approx(40.0, abs=0.1)
-    passed = feed(search, walk(8.0, 1.0, begin_s=40.0), (), periods)
+    passed = feed(search, walk(40.0, 1.0, begin_s=40.0), (), periods)
     assert off_rad(search, 1.0) < TOLERANCE_RAD
     first_s = 1.0e-9 * (int(passed["stamp_ns"][0]) - 1_700_000_000 * SECOND)
     assert search.unmonitored_s == pytest.approx(first_s, abs=0.01)
@@ -124,17 +126,16 @@ def test_waiting_is_bounded_and_what_waited_too_long_is_not_monitored(walk, new_
 @pytest.mark.parametrize("pause_s", [0.0, 3.0])
 def test_an_encoder_that_restarts_is_found_again(pause_s: float, walk, new_search, feed) -> None:
     first, second = walk(4.0, 1.0), walk(4.0, -2.2, begin_s=4.0 + pause_s, seed=1)
-    truths = walk(4.0, 0.0), walk(4.0, 0.0, begin_s=4.0 + pause_s, seed=1)
+    truth = np.concatenate([walk(4.0, 0.0), walk(4.0, 0.0, begin_s=4.0 + pause_s, seed=1)])
     search = new_search()
     passed = feed(search, np.concatenate([first, second]))
     assert search.times_found == 2
     assert off_rad(search, -2.2) < TOLERANCE_RAD
     # none of the second boot has the zero of the first
-    crank, truth = (
-        samples[samples["kind"] == CRANK]["crank_angle_rad"] for samples in (passed, np.concatenate(truths))
-    )
-    off = np.abs(np.remainder(crank - truth + math.pi, math.tau) - math.pi)
-    assert len(crank) == len(truth)
+    is_passed = np.isin(truth["stamp_ns"], passed["stamp_ns"])
+    cranks = (samples[samples["kind"] == CRANK] for samples in (passed, truth[is_passed]))
+    crank, known = (samples["crank_angle_rad"] for samples in cranks)
+    off = np.abs(np.remainder(crank - known + math.pi, math.tau) - math.pi)
     assert off.max() < TOLERANCE_RAD
 
 
@@ -144,18 +145,8 @@ def test_a_gap_in_which_a_counting_encoder_counted_on_changes_nothing(walk, new_
     search = new_search()
     passed = feed(search, whole[(time_s < 10.0) | (time_s > 10.8)])
     assert search.times_found == 1
-    assert len(passed) == len(whole) - np.count_nonzero((time_s >= 10.0) & (time_s <= 10.8))
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_a_glitch_is_no_restart(number: int, walk, new_search, feed) -> None:
-    sent = walk(6.0, 1.0)
-    wrong = np.flatnonzero(sent["kind"] == CRANK)[1000 : 1000 + number]
-    sent["crank_angle_rad"][wrong] += 2.0
-    search = new_search()
-    passed = feed(search, sent)
-    assert search.times_found == 1
-    assert len(passed) == len(sent)
+    later = whole[whole["stamp_ns"] >= passed["stamp_ns"][0]]
+    assert len(passed) == len(later) - np.count_nonzero((time_s >= 10.0) & (time_s <= 10.8))
 
 
 def test_an_angle_that_goes_nowhere_is_not_waited_for(walk, new_search, feed) -> None:
@@ -166,4 +157,4 @@ def test_an_angle_that_goes_nowhere_is_not_waited_for(walk, new_search, feed) ->
     search = new_search()
     feed(search, sent)
     assert search.cause
-    assert sum(len(part) for part in search.waiting) < 1000
+    assert sum(len(part) for part in search._samples) < 1000

@@ -167,11 +167,6 @@ def record(path: Path, truth: dict[str, Any], walk: Floats, seed: int) -> None:
             writer.write_many(channel, stamps, np.concatenate([head, raw], axis=1))
 
 
-def late_s(truth: dict[str, Any]) -> float:
-    """Delay of slow changes of the torque, in addition to the delay of its sampling."""
-    return float(truth["lag_s"] + 1.0 / (TURN * truth["bandwidth_hz"]))
-
-
 def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, float]:
     """Error of each quantity that the recording determines, in standard deviations."""
     found = {item.name: item for item in result.items}
@@ -187,7 +182,6 @@ def errors(truth: dict[str, Any], result: CommissioningResult) -> dict[str, floa
     measured = float(scale.remark.split()[-1])
     sizes = {
         "offset": away("crank.offset_rad", truth["offset_rad"], TURN),
-        "lag": away("lag", late_s(truth)),
         "scale": (measured - truth["factor"]) / (float(scale.sigma or 0.0) * turns),
         "friction": away("friction", truth["friction_nm"]),
         "load friction": away("load friction", truth["load_friction"]),
@@ -225,8 +219,6 @@ def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: 
         f"{truth['source']} / {value('drive_torque.source')}",
         f"{apart:+.3f} ± {offset.sigma:.3f}",
         f"{truth['factor']:.4g} / {factor:.4g}",
-        value("drive_torque.sampling"),
-        pair("lag", late_s(truth), 1, 1.0e3),
         pair("friction", truth["friction_nm"], 2),
         pair("load friction", truth["load_friction"], 3),
         f"{found['crank.sign'].mismatch:.3f}",
@@ -244,10 +236,10 @@ def main() -> None:
     arguments = parser.parse_args()
     print(
         "| seed | rpm | Hz, sampling | foot load, N | signs | gear ratio | source | offset, rad | "
-        "scale × gear | sampling | lag, ms | friction, N m | load friction | mismatch | "
+        "scale × gear | friction, N m | load friction | mismatch | "
         "not enough to tell; does not fit | CPU s |"
     )
-    print("|" + "---|" * 16)
+    print("|" + "---|" * 14)
     away: dict[str, list[float]] = {}
     for seed in range(arguments.first, arguments.first + arguments.number):
         truth = robot(seed) | walk_of(seed) | drive_of(seed)

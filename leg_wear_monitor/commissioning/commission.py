@@ -53,8 +53,8 @@ def commission(
     Parameters
     ----------
     paths : path, table, or iterable of these
-        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory (see `replay`); an encoder may
-        start anew in each.
+        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory (see `replay`), with one zero of
+        the encoder in all.
     config : MonitorConfig or path, optional
         Parameters, or a parameter file: names the mechanism, and supplies the values that are not measured;
         default: the file shipped with the package.
@@ -99,7 +99,7 @@ def commission(
         return result
     joint, torque = found.choice.best.joint.topic, found.choice.best.torque
     topics = joint_states or joint, drive_torque or (None if torque.source == EFFORT else torque.topic)
-    try:  # the last recording gives the phase, as it gives the offset
+    try:
         walk = _walk(recordings[-1:], result.config, *topics)
     except RecordingError as error:
         return attrs.evolve(result, notes=(*result.notes, f"{_LIMIT} stays as it is: {error}"))
@@ -140,7 +140,7 @@ def _found(
 ) -> proposal.Found:
     """The best choice of joint, torque and gear, and the quality of its fit."""
     motions = _cranks(signals.joints, crank_joint)
-    found = candidates(motions, _torques(signals.torques), model)
+    found = candidates(motions, _torques(signals.torques), model, base)
     if not found:
         raise LegWearError(
             "no torque was recorded while a joint turned steadily for five turns of a crank: record a minute "
@@ -209,7 +209,7 @@ def _without_spikes(torque: Series) -> Series:
     """Torques that are not far beyond most of the others."""
     size = np.abs(torque.value)
     near = size <= _SPIKE * np.quantile(size, 0.9)
-    return Series(torque.time_s[near], torque.value[near], torque.recording[near])
+    return Series(torque.time_s[near], torque.value[near])
 
 
 # The recording as the monitor sees it with the proposed parameters: its faults, and its torque residual.

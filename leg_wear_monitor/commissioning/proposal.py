@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
@@ -9,25 +10,27 @@ import attrs
 import numpy as np
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.commissioning.evidence import (
-    Timing,
-    cadence_rpm,
-    cadences_rpm,
-    sampling_of,
-    separates_lag,
-    timing_of,
-    with_load,
-)
+from leg_wear_monitor.commissioning.evidence import cadence_rpm, late_sigma_s
 from leg_wear_monitor.commissioning.search import SAME_GEAR, Choice
 from leg_wear_monitor.configuration import part_document
 from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.estimate.drive import DriveFigures
-from leg_wear_monitor.estimate.joint_motion import JointMotion, with_repeating_acceleration
-from leg_wear_monitor.estimate.torque_model import Fit, Terms, TorqueModel, fit, repeating
+from leg_wear_monitor.estimate.joint_motion import JointMotion
+from leg_wear_monitor.estimate.torque_model import (
+    FRICTION_ERROR,
+    LOAD_FRICTION_ERROR,
+    PHASE_ERROR_RAD,
+    SCALE_ERROR,
+    Fit,
+    Terms,
+    TorqueModel,
+    fit,
+    repeating,
+)
 from leg_wear_monitor.files import data_frame, json_text
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, MAX_LAG_S, WRENCH
+from leg_wear_monitor.monitor.config.inputs import FLOAT64, INTERFACE, WRENCH
 from leg_wear_monitor.monitor.config.parameters import MARK, PARAMETERS, nested, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig, drive_figures
 from leg_wear_monitor.recordings.findings import Finding
@@ -196,15 +199,11 @@ class CommissioningResult:
         return parameter_text(self.config, self.remarks)
 
 
-# The measured quantities: the chosen fit again, with the terms that the recording determines and the lag to
-# allow for.
+# The measured quantities: the chosen fit again, with load friction and with errors.
 
-_AS_WELL = 1.02  # a fit is as good as the best fit up to this ratio of torque residuals
 # fraction of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 with averages, 0.3
 # to 0.45 with instants at 50 to 200 Hz (full coordinates, 60 rpm)
 _UNEXPLAINED = 0.7
-# factor on the errors of friction if the foot carries a load, because its shape is uncertain
-_UNDER_LOAD = 3.0
 
 
 @attrs.frozen(eq=False)
@@ -215,12 +214,8 @@ class Found:
     ----------
     choice : Choice
     fit : Fit
-        With the lag to allow for.
     motion : JointMotion
         Motion of the chosen joint.
-    sampling, why_sampling : str
-        Sampling of the torque, empty if it is not known, and why.
-    timing : Timing
     declared : DriveFigures
     base : MonitorConfig
     """
@@ -228,9 +223,6 @@ class Found:
     choice: Choice
     fit: Fit
     motion: JointMotion
-    sampling: str
-    why_sampling: str
-    timing: Timing
     declared: DriveFigures
     base: MonitorConfig
 
@@ -246,30 +238,20 @@ class Found:
     def friction(self, name: str) -> tuple[float, float]:
         """Friction on the crank and its standard deviation: constant [N m], or relative to the torque."""
         one = self.fit
-        by_clearances = one.error.load_friction * abs(one.gain)
+        by_clearances = LOAD_FRICTION_ERROR * abs(one.gain)
         if name == "friction":
-            by_clearances = one.error.friction * float(one.predicted.std())
-        by_clearances *= _UNDER_LOAD if "load" in one.linear else 1.0
+            by_clearances = FRICTION_ERROR * float(one.predicted.std())
         return one.linear[name] / one.gain, math.hypot(one.sigma[name], by_clearances) / abs(one.gain)
 
 
 def found_of(choice: Choice, motion: JointMotion, model: TorqueModel, base: MonitorConfig) -> Found:
     """Everything that the recording says about the chosen joint and torque."""
-    one, declared = choice.best.fit, drive_figures(base.drive)
-    terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
-    # a repeating acceleration has less noise, but lacks the acceleration of a ramp
-    pairs = one.pair, with_repeating_acceleration(one.pair, one.ratio)
-    own, smoother = (fit(pair, model, one.refined, terms, with_errors=True) for pair in pairs)
-    again = smoother if smoother.mismatch <= _AS_WELL * own.mismatch else own
-    again, terms = with_load(again, model, terms)
-    sampling, why = sampling_of(again, model)
-    timing = timing_of(again, sampling or base.drive_torque.sampling, bool(sampling), declared)
-    start = attrs.evolve(again.refined, lag_s=timing.lag_s)
-    settled = fit(again.pair, model, start, attrs.evolve(terms, lag=False), with_errors=True)
-    return Found(choice, settled, motion, sampling, why, timing, declared, base)
+    one = choice.best.fit
+    again = fit(one.pair, model, one.refined, Terms(load_friction=True), with_errors=True)
+    return Found(choice, again, motion, drive_figures(base.drive), base)
 
 
-# A gear's ratio is the ratio of two numbers of teeth: the simplest fraction within a measurement's error.
+# A gear's ratio is the ratio of two numbers of teeth: a fraction of small numbers within the error.
 
 
 _SURE = 3.0  # standard deviations
@@ -279,7 +261,7 @@ _BY_CHANCE = 0.1  # number of fractions that may be within the error by chance
 
 
 def exact_ratio(measured: float, error: float) -> float | None:
-    """The simplest fraction within a relative error; None if no fraction fits, or if a fit may be chance.
+    """The nearest fraction of small numbers; None if it is not within a relative error, or by chance.
 
     Parameters
     ----------
@@ -291,15 +273,10 @@ def exact_ratio(measured: float, error: float) -> float | None:
     if measured < 1.0:
         inverse = exact_ratio(1.0 / measured, error)
         return None if inverse is None else 1.0 / inverse
-    fractions = 0
-    for denominator in range(1, _LARGEST_DENOMINATOR + 1):
-        fractions += denominator
-        if 2.0 * error * measured * fractions > _BY_CHANCE:
-            return None
-        numerator = round(measured * denominator)
-        if abs(numerator / denominator / measured - 1.0) <= error:
-            return numerator / denominator
-    return None
+    found = Fraction(measured).limit_denominator(_LARGEST_DENOMINATOR)
+    tried = found.denominator * (found.denominator + 1) / 2
+    is_chance = 2.0 * error * measured * tried > _BY_CHANCE
+    return float(found) if abs(found / measured - 1.0) <= error and not is_chance else None
 
 
 def gear(found: Found) -> tuple[float, bool]:
@@ -318,12 +295,12 @@ def _gear_error(one: Fit) -> float:
     return _SURE * one.sigma["ratio"] / abs(one.ratio) + _DRIFT_RAD / max(travel, 1.0e-9)
 
 
-def offset_rad(found: Found, number: int) -> float:
-    """Crank angle at joint position 0 of a recording, from -pi to pi."""
+def offset_rad(found: Found) -> float:
+    """Crank angle at joint position 0, from -pi to pi."""
     one = found.fit
     # with the exact ratio, the phase in the middle of the recording stays the same
-    middle = float(np.median(one.pair.position_rad[one.pair.recording == number]))
-    offset = one.offset_rad[number] + (one.ratio - one.direction / gear(found)[0]) * middle
+    middle = float(np.median(one.pair.position_rad))
+    offset = one.offset_rad + (one.ratio - one.direction / gear(found)[0]) * middle
     return float((offset + math.pi) % TURN - math.pi)
 
 
@@ -334,8 +311,8 @@ def _offset_sigma_rad(found: Found) -> float:
     # were all of the rest that repeats a shift of the phase, it would shift by this
     slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(angle))
     by_rest = repeating(one) * float(one.measured.std() / np.sqrt(np.mean(slope**2)))
-    by_lag = found.timing.sigma_s * float(np.median(np.abs(speed)))
-    return math.hypot(one.sigma["offset_rad"], one.error.phase_rad, by_rest, by_lag)
+    by_lag = late_sigma_s(one, found.base) * float(np.median(np.abs(speed)))
+    return math.hypot(one.sigma["offset_rad"], PHASE_ERROR_RAD, by_rest, by_lag)
 
 
 # Parameters of the monitor from the chosen fit, each with its error and its runner-up.
@@ -384,11 +361,10 @@ def _crank(found: Found) -> Iterator[CommissioningItem]:
     )
     yield CommissioningItem(
         name="crank.offset_rad",
-        value=round(offset_rad(found, max(one.offset_rad)), 4),
+        value=round(offset_rad(found), 4),
         unit="rad",
         sigma=_offset_sigma_rad(found),
-        remark="shifted by clearances"
-        + ("" if found.timing.is_separated else " and, at one cadence, by a lag"),
+        remark="shifted by clearances and by a lag that is not declared",
         mismatch=one.mismatch,
     )
 
@@ -406,15 +382,15 @@ def _torque(found: Found) -> Iterator[CommissioningItem]:
     yield CommissioningItem(
         name="drive_torque.scale",
         value=scale,
-        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), one.error.scale),
+        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), SCALE_ERROR),
         mismatch=one.mismatch,
         remark=f"measured scale times gear ratio: {total:.4g}",
     )
     yield CommissioningItem(name="drive_torque.gear_ratio", value=turns)
     yield CommissioningItem(
         name="drive_torque.sampling",
-        value=found.sampling or found.base.drive_torque.sampling,
-        remark=found.why_sampling if found.sampling else "your value, because it was not determined",
+        value=found.base.drive_torque.sampling,
+        remark="your value; the recording does not show it: look in the drive's manual",
     )
 
 
@@ -432,14 +408,7 @@ def _scale(found: Found) -> tuple[float, float]:
 
 
 def _drive(found: Found) -> Iterator[CommissioningItem]:
-    one, timing, declared, is_separated = found.fit, found.timing, found.declared, found.timing.is_separated
-    yield CommissioningItem(
-        name="lag",
-        value=timing.late_s,
-        unit="s",
-        sigma=timing.error_s if is_separated else None,
-        remark="in addition to the sampling" if is_separated else "at one cadence, part of the offset",
-    )
+    one, declared = found.fit, found.declared
     cadence, tolerance = cadence_rpm(one)
     yield CommissioningItem(name="cadence.commanded_rpm", value=cadence, unit="rpm")
     yield CommissioningItem(name="cadence.tolerance_rpm", value=tolerance, unit="rpm")
@@ -452,16 +421,11 @@ def _drive(found: Found) -> Iterator[CommissioningItem]:
         yield CommissioningItem(
             name=name.replace("_", " "), value=value, unit=unit, sigma=sigma, remark=remark + known
         )
-    if "bias" in one.linear:
-        bias = one.linear["bias"] / one.gain
-        yield CommissioningItem(name="bias", value=bias, unit="N m", sigma=one.sigma["bias"] / abs(one.gain))
 
 
 # Sentences on undetermined parameters, on quantities that do not fit, and on further information.
 
 
-_KNOWN_SIGMAS = 2.0  # standard deviations that must be below the requested accuracy
-_ANEW_RAD = 0.1  # largest difference between the offsets of two recordings with an absolute encoder
 _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating residual that may shift the scale more than twice as much as clearances
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque
@@ -471,21 +435,12 @@ _DRIVES = 0.02  # a constant torque that drives the crank, as a fraction of the 
 
 def not_told(found: Found) -> Iterator[str]:
     """Parameters that the recording does not determine, and why."""
-    one, timing = found.fit, found.timing
+    one = found.fit
     yield from found.doubts
-    if not found.sampling:
-        yield f"drive_torque.sampling: {found.why_sampling}; ask the drive's manual"
-    if not (timing.is_separated or timing.is_declared):
+    if math.isnan(found.declared.lag_s):
         turned = 1.0e-3 * abs(float(np.median(one.crank()[1])))
         yield (
-            f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
-            "record two cadences in one recording, 40 rpm apart, or declare drive.lag_s"
-        )
-    elif not timing.is_declared and _KNOWN_SIGMAS * timing.sigma_s > MAX_LAG_S:
-        error = 1.0e3 * _KNOWN_SIGMAS * timing.sigma_s
-        yield (
-            f"lag: known to ± {error:.2g} ms only, more than the {1.0e3 * MAX_LAG_S:g} ms that are accepted, "
-            "because clearances shift the torque's phase with the cadence; record cadences further apart"
+            f"lag: a torque that is late by 1 ms looks like {turned:.2g} rad of offset; declare drive.lag_s"
         )
     ratio, is_exact = gear(found)
     if not is_exact:
@@ -508,12 +463,6 @@ def not_told(found: Found) -> Iterator[str]:
 def findings(found: Found, mechanism: Mechanism) -> Iterator[str]:
     """Quantities that do not fit, or that cannot be used as they are."""
     one = found.fit
-    if "load" in one.linear:
-        force, sigma = one.linear["load"] / one.gain, one.sigma["load"] / abs(one.gain)
-        yield (
-            f"a foot load of {force:.3g} N ± {sigma:.2g} N explains most of the torque that does not fit; "
-            "the proposal corrects for this load; it is better to record with the foot in the air"
-        )
     if not found.doubts:  # friction and phases say nothing about an unknown leg
         yield from _of_known_leg(found, mechanism)
     for unit, ratio in (("degrees", TURN / 360.0), ("turns", TURN)):
@@ -527,7 +476,7 @@ def findings(found: Found, mechanism: Mechanism) -> Iterator[str]:
 
 
 def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
-    one, timing = found.fit, found.timing
+    one = found.fit
     rest = repeating(one)
     if rest > _NOTABLE_REST:
         yield (
@@ -538,27 +487,13 @@ def _of_known_leg(found: Found, mechanism: Mechanism) -> Iterator[str]:
     if friction < -_SURE * sigma and abs(friction) > _DRIVES * float(one.predicted.std() / abs(one.gain)):
         size = f"{-friction:.2g} ± {sigma:.1g} N m"
         yield f"a constant torque of {size} drives the crank: zero the torque sensor"
-    late, most = timing.late_s, found.base.drive.largest_lag_s
-    if abs(late) - _SURE * timing.error_s > most:
-        yield (
-            f"the torque is late by {1.0e3 * late:.3g} ms, more than the accepted {1.0e3 * MAX_LAG_S:g} ms "
-            f"and the declared lag of the drive ({1.0e3 * most:.3g} ms)"
-        )
-    offsets = [offset_rad(found, number) for number in sorted(one.offset_rad)]
-    if max(abs(math.remainder(each - offsets[0], TURN)) for each in offsets) >= _ANEW_RAD:
-        each = ", ".join(f"{offset:.3f}" for offset in offsets)
-        yield (
-            f"the encoder starts at a different zero in each recording: the torque's phase gives the offsets "
-            f"{each} rad; the proposed offset is from the last recording and is valid until the next boot"
-        )
 
 
 def notes(found: Found) -> Iterator[str]:
     """Further information for the operator."""
     joint, torque = found.choice.best.joint, found.choice.best.torque
-    yield from found.choice.also
     ratio = gear(found)[0]
-    if ratio != 1.0 and len(found.fit.offset_rad) == 1:
+    if ratio != 1.0:
         yield (
             f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each "
             "boot, the offset is valid until the next boot: set crank.zero to at_start"
@@ -568,10 +503,3 @@ def notes(found: Found) -> Iterator[str]:
             yield f"start the monitor with -r {name}:={topic}, replay with --{name.replace('_', '-')} {topic}"
     if torque.source == FLOAT64:
         yield "a Float64 has no stamp: the torque is stamped on arrival, so a late message looks like a lag"
-    speeds = cadences_rpm(found.fit)
-    if len(speeds) > 1:
-        each = " and ".join(f"{speed:g}" for speed in speeds)
-        yield (
-            f"the leg walks at about {each} rpm; cadence.commanded_rpm is the most frequent one: "
-            "set it to the cadence of its work"
-        )

@@ -7,11 +7,13 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.commissioning.evidence import late_s
 from leg_wear_monitor.estimate.joint_motion import JointMotion, Pair, Series, paired, steady_stretch
 from leg_wear_monitor.estimate.torque_model import Fit, Start, TorqueModel, fit, repeating, too_alike
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import EFFORT, INTERFACE
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.series import JointName, TorqueSource
 
 # Search of start values: every gear ratio, direction, offset and torque sign at once, by the leg's model.
@@ -66,7 +68,7 @@ def scan(pair: Pair, model: TorqueModel, count: int) -> list[Start]:
                 angle = TURN / _OFFSETS * float((sign * along[peak]).argmax())
                 turned = direction * float(ratio[peak])
                 offset = angle - turned * origin
-                starts.append(Start(turned, offset, sign, float(explained[peak]), int(pair.recording[0])))
+                starts.append(Start(turned, offset, sign, float(explained[peak])))
     return starts
 
 
@@ -111,7 +113,6 @@ def _peaks(value: Floats, count: int) -> list[int]:
 _PEAKS = 2  # ratios that are fitted, of each direction and sign
 _HOPELESS = 0.3  # pairs below this fraction of the best result get only one fit
 _LEAST_PAIRS = 4  # keep a second-best candidate
-_ON_ONE_SHAFT_RAD = 0.005  # above smoothed noise; the ripple of a gait is larger
 SAME_GEAR = 0.05
 
 
@@ -128,6 +129,7 @@ def candidates(
     joints: dict[JointName, JointMotion],
     torques: dict[TorqueSource, Series],
     model: TorqueModel,
+    base: MonitorConfig,
 ) -> list[Candidate]:
     """Fits of all joints that turn with all torques, the best first; none if there is too little of them."""
     starts: list[tuple[JointName, TorqueSource, Pair, Pair, list[Start]]] = []
@@ -137,7 +139,7 @@ def candidates(
                 continue  # the monitor takes the crank's own effort
             if torque.source == INTERFACE and torque.component != joint.joint:
                 continue
-            pair = paired(motion, series)
+            pair = paired(motion, series, late_s(series, base))
             steady = steady_stretch(pair)
             found = sorted(scan(steady, model, _PEAKS), key=lambda start: -start.explained)
             if found:
@@ -157,17 +159,7 @@ def candidates(
 def _refined(pair: Pair, steady: Pair, model: TorqueModel, start: Start) -> Fit:
     """Fit of the steady stretch, which makes the ratio exact enough for the fit of all."""
     near = fit(steady, model, start)
-    offset = near.offset_rad[start.recording]
-    return fit(pair, model, attrs.evolve(start, ratio=near.ratio, offset_rad=offset))
-
-
-def on_one_shaft(one: Fit, other: Fit) -> bool:
-    """True if two joints turn in a fixed ratio, so that their crank angles differ by a constant."""
-    angle, there = one.crank()[0], other.crank()[0]
-    time_s, times = one.pair.time_s, other.pair.time_s
-    both = (time_s >= times[0]) & (time_s <= times[-1])
-    apart = (angle - np.interp(time_s, times, there))[both]
-    return len(apart) > 0 and float(apart.std()) < _ON_ONE_SHAFT_RAD
+    return fit(pair, model, near.refined)
 
 
 def same_gear(one: Fit, other: Fit) -> bool:
@@ -193,19 +185,16 @@ class Choice:
     rivals : dict of str to Candidate
     doubts : tuple of str
         Why the choice is not sure; empty if it is.
-    also : tuple of str
-        Rivals that mean the same, such as a second encoder of the shaft.
     """
 
     best: Candidate
     rivals: dict[str, Candidate]
     doubts: tuple[str, ...]
-    also: tuple[str, ...]
 
 
 def choose(found: list[Candidate]) -> Choice:
     """Choose among candidates, the best first; there is at least one."""
-    best = _nearest_to_the_crank(found)
+    best = found[0]
     of_pair = [each for each in found if (each.joint, each.torque) == (best.joint, best.torque)]
     respects: dict[str, tuple[list[Candidate], Callable[[Candidate], bool]]] = {
         "crank.sign": (of_pair, lambda each: each.fit.direction != best.fit.direction),
@@ -217,49 +206,29 @@ def choose(found: list[Candidate]) -> Choice:
             lambda each: each.joint == best.joint and each.torque != best.torque,
         ),
     }
-    rivals, doubts, also = {}, [], []
+    rivals, doubts = {}, []
     for name, (among, differs) in respects.items():
         rival = next(filter(differs, among), None)  # the best one
         if rival is None:
             continue
         rivals[name] = rival
-        if too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS):
-            same = _as_same(name, best, rival)
-            also += [same] if same else []
-            doubts += [] if same else [f"{name}: {_doubt(name, best, rival)}"]
+        is_alike = too_alike(best.fit, rival.fit, other_signal=name in _SIGNALS)
+        if is_alike and not (name == "drive_torque.source" and _is_same_torque(best, rival)):
+            doubts.append(f"{name}: {_doubt(name, best, rival)}")
     rest = repeating(best.fit)
     if rest > _ANOTHER_LEG:
         doubts.append(
             f"a different leg: {100.0 * rest:.0f} % of the torque repeats with each turn and does not fit "
             "this mechanism at any crank angle"
         )
-    return Choice(best, rivals, tuple(doubts), tuple(also))
+    return Choice(best, rivals, tuple(doubts))
 
 
-def _nearest_to_the_crank(found: list[Candidate]) -> Candidate:
-    """Candidate with the smallest gear ratio among joints on one shaft, which fit equally well."""
-    best = found[0]
-    near = [
-        each
-        for each in found
-        if each.joint != best.joint
-        and too_alike(best.fit, each.fit, other_signal=True)
-        and on_one_shaft(best.fit, each.fit)
-        and not same_gear(each.fit, best.fit)
-    ]
-    return min([best, *near], key=lambda each: abs(math.log(each.fit.gear_ratio)))
-
-
-def _as_same(name: str, best: Candidate, rival: Candidate) -> str:
-    """Why an equal candidate is equivalent: a second encoder or sensor of the shaft; otherwise empty."""
-    if name == "crank_joint" and on_one_shaft(best.fit, rival.fit) and not same_gear(best.fit, rival.fit):
-        return f"{rival.joint.joint} also turns with the crank, at {rival.fit.gear_ratio:.6g} turns per turn"
-    number = int(best.fit.pair.recording[0])
-    if name != "drive_torque.source" or number not in rival.fit.offset_rad:
-        return ""
-    apart = math.remainder(best.fit.offset_rad[number] - rival.fit.offset_rad[number], TURN)
-    same = best.fit.direction == rival.fit.direction and same_gear(best.fit, rival.fit)
-    return f"{rival.torque.label} is the same torque" if same and abs(apart) < _SAME_PHASE_RAD else ""
+def _is_same_torque(best: Candidate, rival: Candidate) -> bool:
+    """True if a rival is a second sensor of the same torque."""
+    apart = math.remainder(best.fit.offset_rad - rival.fit.offset_rad, TURN)
+    is_same = best.fit.direction == rival.fit.direction and same_gear(best.fit, rival.fit)
+    return is_same and abs(apart) < _SAME_PHASE_RAD
 
 
 def _doubt(name: str, best: Candidate, rival: Candidate) -> str:

@@ -44,30 +44,10 @@ def at_angles(tables: Floats, angle: Floats) -> tuple[Floats, Floats]:
     return values + (place - left) * step, step * (points / TURN)
 
 
-@attrs.frozen(kw_only=True)
-class ModelError:
-    """Standard deviations of the effects of clearances that are not in a model.
-
-    Attributes
-    ----------
-    phase_rad, lag_rad : float
-        Standard deviation of the torque's phase, and of its change between speeds [rad].
-    scale : float
-        Standard deviation of a factor on the torque.
-    friction : float
-        Standard deviation of the constant friction, as a fraction of the torque's RMS.
-    load_friction : float
-    """
-
-    phase_rad: float
-    lag_rad: float
-    scale: float
-    friction: float
-    load_friction: float
-
-
-# six legs in full coordinates behind 18 drives, 30 to 85 rpm
-_IDEAL = ModelError(phase_rad=PHASE_ERROR_RAD, lag_rad=0.01, scale=0.035, friction=0.012, load_friction=0.025)
+# Standard deviations of the effects of clearances that are not in the model, of six legs in full coordinates
+# behind 18 drives, 30 to 85 rpm: of a factor on the torque, of the constant friction as a fraction of the
+# torque's RMS, and of the load friction.
+SCALE_ERROR, FRICTION_ERROR, LOAD_FRICTION_ERROR = 0.035, 0.012, 0.025
 
 
 @attrs.frozen(eq=False)
@@ -80,12 +60,10 @@ class TorqueModel:
         Static torque [N m], and by speed [N m s], squared speed [N m s^2], acceleration [kg m^2].
     load : (points,) array
         Torque by a foot load of one newton up [N m/N]; zeros for a mechanism without a toe.
-    error : ModelError
     """
 
     tables: Floats
     load: Floats
-    error: ModelError = _IDEAL
 
     def torque(self, angle: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
         """Torque [N m] and its derivative by the angle [N m/rad], each (n,)."""
@@ -234,19 +212,12 @@ class Start:
     torque_sign : int
     explained : float
         Fraction of the torque's variance that the model explains.
-    recording : int
-        Recording whose torque was used.
-    lag_s : float
-        Time by which slow changes of the torque are late [s]; it stays unless it is among the terms of the
-        fit.
     """
 
     ratio: float
     offset_rad: float
     torque_sign: int
     explained: float
-    recording: int
-    lag_s: float = 0.0
 
 
 # Means over a twelfth of a turn: impacts of joints with clearance average out, the leg's torque stays.
@@ -300,7 +271,7 @@ class Blocks:
 
     @property
     def turn(self) -> NDArray[np.int64]:
-        """Turn of each kept run, counted from 0 over all recordings."""
+        """Turn of each kept run, counted from 0."""
         turns = self.part[self.kept] // BINS
         changes = np.abs(np.diff(turns)) > 0
         return np.concatenate([[0], np.cumsum(changes)]) if len(turns) else turns
@@ -309,16 +280,12 @@ class Blocks:
 def blocks_of(pair: Pair, ratio: float) -> Blocks:
     """Blocks of a pair, with the ratio of the crank's angle to the joint's."""
     part = np.floor(ratio * pair.position_rad * (BINS / TURN)).astype(np.int64)
-    change = (np.diff(part) != 0) | (np.diff(pair.recording) != 0)
-    first = np.concatenate([[0], 1 + np.flatnonzero(change)])
+    first = np.concatenate([[0], 1 + np.flatnonzero(np.diff(part) != 0)])
     length = np.diff(np.concatenate([first, [len(part)]]))
     return Blocks(first, length, length >= 0.5 * np.median(length), part[first])
 
 
-# Regression of measured on predicted torque: terms, parameters during the iteration, columns.
-
-
-PHASES = 128  # tried offsets, if a start does not give an offset
+# Regression of measured on predicted torque.
 
 
 @attrs.frozen
@@ -326,101 +293,41 @@ class Terms:
     """Terms of the regression besides gain, friction and offset."""
 
     ratio: bool = True
-    bias: bool = False
     load: bool = False
     load_friction: bool = False
-    lag: bool = False
 
     @property
     def linear(self) -> tuple[str, ...]:
         """Names of the linear terms."""
-        further = ("bias", "load", "load_friction")
+        further = ("load", "load_friction")
         return ("gain", "friction", *(name for name in further if getattr(self, name)))
 
 
-@attrs.frozen(eq=False)
-class State:
-    """Parameters during the iteration.
-
-    Attributes
-    ----------
-    ratio : float
-        Turns of the crank per turn of the joint.
-    phase, middle : (recordings,) array
-        Crank angle at a position in the middle of each recording, and the position [rad].
-    row : (n,) array of int
-        Recording of each sample, as an index of `phase`.
-    lag_s : float
-        As in `Start`.
-    """
-
-    ratio: float
-    phase: Floats
-    middle: Floats
-    row: NDArray[np.int64]
-    lag_s: float = 0.0
-
-    def vector(self, terms: Terms) -> Floats:
-        """Phases, and ratio and lag where they are terms (k,)."""
-        return np.concatenate([self.phase, [self.ratio] * terms.ratio, [self.lag_s] * terms.lag])
-
-    def at(self, x: Floats, terms: Terms) -> "State":
-        """State with other phases, ratio and lag (k,)."""
-        k = len(self.phase)
-        ratio, lag_s = float(x[k]) if terms.ratio else self.ratio, float(x[-1]) if terms.lag else self.lag_s
-        return attrs.evolve(self, phase=x[:k], ratio=ratio, lag_s=lag_s)
-
-
-def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
-    """State at a start; the phases of other recordings are those that explain most."""
-    numbers, row = np.unique(pair.recording, return_inverse=True)
-    middle = np.array([np.median(pair.position_rad[row == i]) for i in range(len(numbers))])
-    phase = start.ratio * middle + start.offset_rad
-    for i, number in enumerate(numbers.tolist()):
-        if number != start.recording:
-            explained = explained_by_phase(pair.part(row == i), model, start, float(middle[i]))
-            phase[i] = explained.argmax() * TURN / PHASES
-    return State(start.ratio, phase, middle, row, start.lag_s)
-
-
-def explained_by_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> Floats:
-    """Torque that the model explains (PHASES,), at equal steps of the crank angle at a position [rad]."""
-    blocks = blocks_of(pair, start.ratio)
-    measured = blocks.mean(pair.torque)
-    speed, acceleration = start.ratio * pair.speed_radps, start.ratio * pair.acceleration_radps2
-    explained = np.empty(PHASES)
-    for i in range(PHASES):
-        angle = start.ratio * (pair.position_rad - middle) + i * TURN / PHASES
-        torque = blocks.mean(model.torque(angle, speed, acceleration)[0])
-        torque -= torque.mean()
-        explained[i] = start.torque_sign * float(torque @ measured) / float(np.linalg.norm(torque))
-    return explained
-
-
 def columns(
-    pair: Pair, model: TorqueModel, state: State, terms: Terms, blocks: Blocks
+    pair: Pair, model: TorqueModel, phase: float, ratio: float, terms: Terms, blocks: Blocks
 ) -> tuple[Floats, Floats]:
-    """Columns of the linear terms, and at unit gain of small changes of phases, ratio and lag, by block."""
-    position, speed, acceleration = pair.earlier(state.lag_s)
-    late, speed = position - state.middle[state.row], state.ratio * speed
-    angle = state.ratio * late + state.phase[state.row]
-    torque, slope = model.torque(angle, speed, state.ratio * acceleration)
+    """Columns of the linear terms, and at unit gain of small changes of phase and ratio, by block.
+
+    ``phase``: crank angle at the middle position of the joint.
+    """
+    turned, speed = pair.position_rad - _middle(pair), ratio * pair.speed_radps
+    angle = ratio * turned + phase
+    torque, slope = model.torque(angle, speed, ratio * pair.acceleration_radps2)
     linear = [torque, np.sign(speed)]
-    if terms.bias:
-        linear.append(np.ones_like(torque))
     if terms.load:
         linear.append(model.load_torque(angle))
     if terms.load_friction:
         linear.append(np.abs(torque) * np.sign(speed))
-    moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
-    if terms.ratio:
-        moving.append(slope * late)
-    if terms.lag:
-        moving.append(-slope * speed)
+    moving = [slope, slope * turned] if terms.ratio else [slope]
     return blocks.mean(np.array(linear)), blocks.mean(np.array(moving))
 
 
-# Least squares (Gauss-Newton) of gear ratio, offset, lag, scale, friction, bias and foot load.
+def _middle(pair: Pair) -> float:
+    """Position [rad] in the middle of a joint's way: there, ratio and phase do not depend on each other."""
+    return float(np.median(pair.position_rad))
+
+
+# Least squares (Gauss-Newton) of gear ratio, offset, scale, friction and foot load.
 
 
 _LONGEST_STEP_RAD = 0.2  # largest change of the phase per step: half a radian of the torque's third harmonic
@@ -438,29 +345,22 @@ class Fit:
     ----------
     ratio : float
         Turns of the crank per turn of the joint, negative if it turns against it.
-    offset_rad : dict of int to float
-        Crank angle at joint position 0, of each recording, from -pi to pi.
+    offset_rad : float
+        Crank angle at joint position 0, from -pi to pi.
     linear : dict of str to float
         By name: ``gain`` (measured torque per torque on the crank, negative for a negative sign),
-        ``friction`` and ``bias`` (constant along the motion, and constant) in the sensor's unit, ``load``
-        (``gain`` times the foot load [N]).
-    lag_s : float
-        Time by which slow changes of the torque are late [s].
+        ``friction`` (constant along the motion) in the sensor's unit, ``load`` (``gain`` times the foot load
+        [N]).
     sigma : dict of str to float
-        Standard deviations of ``ratio``, ``offset_rad``, ``lag_s`` and the linear terms; empty if not asked
-        for.
-    error : ModelError
-        Effect of clearances that is not in the standard deviations.
+        Standard deviations of ``ratio``, ``offset_rad`` and the linear terms; empty if not asked for.
     measured, predicted, rest : (m,) arrays
         Torques of the blocks, in the sensor's unit; the prediction is the torque of the leg alone.
     """
 
     ratio: float
-    offset_rad: dict[int, float]
+    offset_rad: float
     linear: dict[str, float]
-    lag_s: float
     sigma: dict[str, float]
-    error: ModelError
     measured: Floats
     predicted: Floats
     rest: Floats
@@ -476,9 +376,7 @@ class Fit:
     @property
     def refined(self) -> Start:
         """Start of a further fit."""
-        return attrs.evolve(
-            self.start, ratio=self.ratio, offset_rad=self.offset_rad[self.start.recording], lag_s=self.lag_s
-        )
+        return attrs.evolve(self.start, ratio=self.ratio, offset_rad=self.offset_rad)
 
     @property
     def mismatch(self) -> float:
@@ -502,24 +400,21 @@ class Fit:
 
     @property
     def turns(self) -> float:
-        """Turns of the crank from first to last sample of each recording, the longest way round."""
-        pair = self.pair
-        reach = sum(float(np.ptp(pair.position_rad[pair.recording == i])) for i in self.offset_rad)
-        return abs(self.ratio) * reach / TURN
+        """Turns of the crank from the first to the last sample, the longest way round."""
+        return abs(self.ratio) * float(np.ptp(self.pair.position_rad)) / TURN
 
     def crank(self) -> tuple[Floats, Floats, Floats]:
         """Angle, speed and acceleration of the crank when the torque was made, for each sample."""
-        pair = self.pair
-        offset = np.array([self.offset_rad[number] for number in pair.recording.tolist()])
-        position, speed, acceleration = pair.earlier(self.lag_s)
-        return self.ratio * position + offset, self.ratio * speed, self.ratio * acceleration
+        pair, ratio = self.pair, self.ratio
+        angle = ratio * pair.position_rad + self.offset_rad
+        return angle, ratio * pair.speed_radps, ratio * pair.acceleration_radps2
 
 
 @attrs.frozen(eq=False)
 class _Columns(Point):
-    """Parameters during the iteration; columns (k, m) and coefficients (k,) of linear terms; motion."""
+    """Phase and ratio during the iteration; columns (k, m) and coefficients (k,) of linear terms; motion."""
 
-    state: State
+    x: Floats
     by_linear: Floats
     linear: Floats
     by_motion: Floats
@@ -531,42 +426,36 @@ def fit(
     """Best fit near a start; standard deviations and last digits only on request, because they take long."""
     blocks = blocks_of(pair, start.ratio)
     measured = blocks.mean(pair.torque)
-    begun = begin(pair, model, start)
-
-    sign = 0.0
+    middle, sign = _middle(pair), 0.0
+    begun = np.array([start.ratio * middle + start.offset_rad, start.ratio])[: 1 + terms.ratio]
 
     def at(x: Floats) -> _Columns:
         """Motion (k,) with the best linear terms, which go with it, and a gain of the sign at the start."""
         nonlocal sign
-        state = begun.at(x, terms)
-        by_linear, by_motion = columns(pair, model, state, terms, blocks)
+        ratio = float(x[1]) if terms.ratio else start.ratio
+        by_linear, by_motion = columns(pair, model, float(x[0]), ratio, terms, blocks)
         linear = solved(by_linear.T, measured)
         by_motion *= linear[0]
         sign = sign or float(np.sign(linear[0]))
         return _Columns(
             linear @ by_linear - measured if linear[0] * sign > 0.0 else np.full(len(measured), np.inf),
             lambda: by_motion.T - by_linear.T @ solved(by_linear.T, by_motion.T),
-            state,
+            x,
             by_linear,
             linear,
             by_motion,
         )
 
-    reach = 0.5 * float(np.ptp(pair.position_rad))
-    scale = np.concatenate([np.ones(len(begun.phase)), [1.0 / reach] * terms.ratio, [np.inf] * terms.lag])
+    scale = np.array([1.0, 2.0 / float(np.ptp(pair.position_rad))])[: 1 + terms.ratio]
     done = scale * (_EXACT_RAD if with_errors else _DONE_RAD)
-    best = gauss_newton(at, begun.vector(terms), longest=scale * _LONGEST_STEP_RAD, done=done).point
-    state, linear, rest = best.state, best.linear, -best.rest
+    best = gauss_newton(at, begun, longest=scale * _LONGEST_STEP_RAD, done=done).point
+    ratio, linear, rest = float(best.x[1]) if terms.ratio else start.ratio, best.linear, -best.rest
     by = np.concatenate([best.by_linear, best.by_motion])
-    sigma = _errors(by, rest, state, terms) if with_errors else {}
-    offset = (state.phase - state.ratio * state.middle + math.pi) % TURN - math.pi
     return Fit(
-        ratio=state.ratio,
-        offset_rad=dict(zip(np.unique(pair.recording).tolist(), offset.tolist(), strict=True)),
+        ratio=ratio,
+        offset_rad=(float(best.x[0]) - ratio * middle + math.pi) % TURN - math.pi,
         linear=dict(zip(terms.linear, linear.tolist(), strict=True)),
-        lag_s=state.lag_s,
-        sigma=sigma,
-        error=model.error,
+        sigma=_errors(by, rest, middle, terms) if with_errors else {},
         measured=measured,
         predicted=linear[0] * best.by_linear[0],
         rest=rest,
@@ -576,14 +465,12 @@ def fit(
     )
 
 
-def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, float]:
+def _errors(by: Floats, rest: Floats, middle: float, terms: Terms) -> dict[str, float]:
     """Standard deviations by the names of the parameters."""
-    moving = [name for name, is_free in (("ratio", terms.ratio), ("lag_s", terms.lag)) if is_free]
-    names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), *moving)
+    names = (*terms.linear, "offset_rad", *["ratio"] * terms.ratio)
     found = jackknife(lambda some: solved(by[:, some].T, rest[some]), len(rest), _CHUNKS)
     sigma = {"ratio": 0.0} | dict(zip(names, found.tolist(), strict=True))
-    phase = max(sigma[f"phase {i}"] for i in range(len(state.phase)))
-    sigma["offset_rad"] = math.hypot(phase, sigma["ratio"] * float(np.abs(state.middle).max()))
+    sigma["offset_rad"] = math.hypot(sigma["offset_rad"], sigma["ratio"] * abs(middle))
     return sigma
 
 

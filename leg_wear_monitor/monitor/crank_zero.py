@@ -213,7 +213,7 @@ class CrankZero(Observer):
 
 
 def _series(samples: Samples, name: str, origin_ns: int) -> Series:
-    return series(samples["stamp_ns"], samples[name], np.zeros(len(samples), np.int64), origin_ns)
+    return series(samples["stamp_ns"], samples[name], origin_ns)
 
 
 def zero_of(crank: Series, torque: Series, turns: int, model: TorqueModel, sampling: str) -> Zero | str:
@@ -231,13 +231,13 @@ def zero_of(crank: Series, torque: Series, turns: int, model: TorqueModel, sampl
     number = len(torque.value)
     if number < _LEAST_SAMPLES * turns:
         return f"the drive torque had {number} samples in {turns} turns. Expected {_LEAST_SAMPLES} per turn"
-    pair = paired(motion_of(crank), torque)
+    late_s = 0.5 * float(np.median(np.diff(torque.time_s))) if sampling == AVERAGE else 0.0
+    pair = paired(motion_of(crank), torque, late_s)
     if len(pair.torque) < _LEAST_SAMPLES or not float(pair.torque.std()) > 0.0:
         return "the drive torque did not change"
     # fits from all phases, with the configured sign, the best first; the foot may be on the ground
-    lag_s = 0.5 * pair.interval_s if sampling == AVERAGE else 0.0
     terms, middle = Terms(ratio=False, load=bool(model.load.any())), float(np.median(pair.position_rad))
-    start = Start(1.0, -middle, torque_sign=1, explained=0.0, recording=0, lag_s=lag_s)
+    start = Start(1.0, -middle, torque_sign=1, explained=0.0)
     starts = [attrs.evolve(start, offset_rad=phase - middle) for phase in _PHASES.tolist()]
     fits = [one for one in (fit(pair, model, each, terms) for each in starts) if one.gain > 0.0]
     fits.sort(key=lambda one: one.mismatch)
@@ -245,11 +245,11 @@ def zero_of(crank: Series, torque: Series, turns: int, model: TorqueModel, sampl
     # reasons why the best fit may be wrong
     if best is None or best.mismatch > _UNLIKE or repeating(best) > _ANOTHER_LEG:
         return "the drive torque did not fit this leg at any crank angle: see drive_torque.sign"
-    offset_rad, sigma_rad = best.offset_rad[0], best.sigma["offset_rad"]
-    rivals = (one for one in fits if abs(math.remainder(one.offset_rad[0] - offset_rad, TURN)) > _APART_RAD)
+    offset_rad, sigma_rad = best.offset_rad, best.sigma["offset_rad"]
+    rivals = (one for one in fits if abs(math.remainder(one.offset_rad - offset_rad, TURN)) > _APART_RAD)
     rival = next(rivals, None)
     if rival and too_alike(best, rival):
-        both = f"{offset_rad:.2f} and {rival.offset_rad[0]:.2f} rad"
+        both = f"{offset_rad:.2f} and {rival.offset_rad:.2f} rad"
         return f"{both} explained the drive torque almost equally well"
     if sigma_rad > _SURE_RAD:
         return f"the zero was uncertain by {sigma_rad:.2g} rad. Expected {_SURE_RAD:g} rad"

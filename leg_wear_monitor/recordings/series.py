@@ -153,8 +153,7 @@ def read_signals(
                     progress(min(1.0, read / total))
             findings += source.file.findings
             for name, stamps, values in _continued(source.bag_file.path, parts, findings):
-                recording = np.full(len(stamps), source.bag_file.recording)
-                collected.setdefault(name, []).append((stamps, values, recording))
+                collected.setdefault(name, []).append((stamps, values))
     return _signals(collected), findings
 
 
@@ -326,11 +325,11 @@ def _signals(collected: dict[_Name, list[Any]]) -> Signals:
         name: [np.concatenate(column) for column in zip(*parts, strict=True)]
         for name, parts in collected.items()
     }
-    all_ns = np.unique(np.concatenate([stamps for stamps, _, _ in full.values()] or [np.zeros(0, np.int64)]))
+    all_ns = np.unique(np.concatenate([stamps for stamps, _ in full.values()] or [np.zeros(0, np.int64)]))
     walked_ns = np.cumsum(np.minimum(np.diff(all_ns, prepend=all_ns[:1]), _LONGEST_PAUSE_NS))
     found = {
-        name: series(walked_ns[np.searchsorted(all_ns, stamps)], values, recording, 0)
-        for name, (stamps, values, recording) in full.items()
+        name: series(walked_ns[np.searchsorted(all_ns, stamps)], values, 0)
+        for name, (stamps, values) in full.items()
         if len(stamps)
     }
     joints = {name: one for name, one in found.items() if isinstance(name, JointName)}

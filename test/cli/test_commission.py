@@ -24,7 +24,7 @@ def commissioned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, comman
 
 def test_the_sample_recording_gives_files_that_check_accepts(commissioned, run) -> None:
     place, result = commissioned
-    assert result.code == 1  # one cadence does not tell a lag from an offset
+    assert result.code == 1  # a lag that is not declared looks like an offset
     assert "not determined: lag" in result.out
     assert "drive_torque.sign" in result.out
     config = lw.load_config(place / "monitor.yaml")

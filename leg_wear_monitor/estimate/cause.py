@@ -136,9 +136,8 @@ class TorqueExplanation:
 
     Attributes
     ----------
-    alternatives : tuple of tuple of NamedCause
-        Each explains the torque as well as the others, the best first, and is made of causes that hold at
-        once; empty: nothing explains half of the torque residual.
+    alternatives : tuple of NamedCause
+        Each explains the torque as well as the others, the best first; empty: no single cause explains it.
     before, after : float
         Torque residual without and with the first alternative, as a fraction of the predicted RMS.
     after_sigma : float
@@ -146,20 +145,14 @@ class TorqueExplanation:
         Fraction below which a torque counts as predicted.
     speed_radps : float
         Mean crank speed.
-    bias : NamedCause
-        Constant torque that friction cannot be, for the first alternative.
-    cycles : int
-        Gait cycles in the explanation.
     """
 
-    alternatives: tuple[tuple[NamedCause, ...], ...] = ()
+    alternatives: tuple[NamedCause, ...] = ()
     before: float
     after: float
     after_sigma: float
     limit: float
     speed_radps: float
-    bias: NamedCause = NamedCause(Cause.BIAS, 0.0, math.nan)
-    cycles: int = 0
 
     @property
     def is_whole(self) -> bool:
@@ -167,16 +160,16 @@ class TorqueExplanation:
         return self.after <= self.limit
 
     @property
-    def named(self) -> tuple[NamedCause, ...]:
-        """The causes, if no other causes fit and they explain most of the torque residual."""
+    def named(self) -> NamedCause | None:
+        """The cause, if no other cause fits and it explains most of the torque residual."""
         # a smaller fraction is part of an unknown cause
         sure = len(self.alternatives) == 1 and (self.is_whole or self.after <= 0.25 * self.before)
-        return self.alternatives[0] if sure else ()
+        return self.alternatives[0] if sure else None
 
     @property
     def is_input_fault(self) -> bool:
         """True if the torque or the crank angle is wrong as received."""
-        return bool(self._possible) and all(any(map(_is_of_input, each)) for each in self._possible)
+        return bool(self._possible) and all(one.cause in INPUTS for one in self._possible)
 
     @property
     def hides_leg(self) -> bool:
@@ -184,22 +177,16 @@ class TorqueExplanation:
 
         A delay or an offset of the crank does not hide it, because the diagnosis estimates them with the leg.
         """
-        return self.is_input_fault and not all(map(self._is_timing, self._possible))
+        return self.is_input_fault and not all(map(self._is_delay, self._possible))
 
     @property
-    def _possible(self) -> tuple[tuple[NamedCause, ...], ...]:
-        """The alternatives; if they explain everything, only the certain alternative."""
-        return self.alternatives if self.is_whole else (self.named,)
+    def _possible(self) -> tuple[NamedCause, ...]:
+        """The alternatives; unless they explain everything, only the certain one."""
+        return self.alternatives if self.is_whole else tuple(filter(None, (self.named,)))
 
-    def _is_timing(self, causes: tuple[NamedCause, ...]) -> bool:
-        """True if only the time of the torque is wrong as received, by a delay that is estimated."""
-        wrong = [one for one in causes if _is_of_input(one)]
-        late_s = -sum(one.value for one in wrong) / self.speed_radps
-        return all(one.cause is Cause.TIMING for one in wrong) and LEAST_DELAY_S < late_s < MOST_DELAY_S
-
-
-def _is_of_input(one: NamedCause) -> bool:
-    return one.cause in INPUTS
+    def _is_delay(self, one: NamedCause) -> bool:
+        """True if the torque comes later by a delay that is estimated."""
+        return one.cause is Cause.TIMING and LEAST_DELAY_S < -one.value / self.speed_radps < MOST_DELAY_S
 
 
 def beyond_friction(constant_nm: float, sigma_nm: float, max_friction_nm: float) -> NamedCause:

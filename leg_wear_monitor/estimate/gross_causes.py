@@ -2,12 +2,12 @@
 
 They need no reference and no baseline, only the curve of the torque over a turn of the crank: the predicted
 curve, times a factor, with a foot load and a heavier body, turned by an angle. Each of these quantities has
-the narrow prior of a leg without a fault, or a wide prior if it is a cause. The most probable set of causes
-explains the residual, with the odds of `cause` for a further cause and for a name.
+the narrow prior of a leg without a fault, or a wide prior if it is the cause. The most probable single cause
+explains the residual, with the odds of `cause` for a cause and for a name.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import attrs
@@ -19,9 +19,7 @@ from leg_wear_monitor.estimate.cause import (
     Cause,
     NamedCause,
     TorqueExplanation,
-    beyond_friction,
 )
-from leg_wear_monitor.estimate.least_squares import solved
 from leg_wear_monitor.estimate.torque_model import at_speed, body_torques
 from leg_wear_monitor.mechanism.arrays import Complex, Floats
 from leg_wear_monitor.mechanism.position import TURN
@@ -34,12 +32,12 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueProfile
 _HARMONICS = (10, 6)
 _LEAST_POINTS = 3  # least number of phases with samples, per harmonic
 
-_MOST_CAUSES = 3
 _SCALE_SIGMA = 0.001  # without a cause, the factor is the declared one
 _ANY, _ANY_LOAD_N = 10.0, 1.0e4  # wide priors of the factor and of the load
 # prior of a body's mass, as a fraction of it: a tool or a cover, rarely as heavy as the body itself
 _MASS_SIGMA = 0.5
 _MODEL_ERROR = 0.02  # fraction of the predicted RMS that even the right causes leave
+_PART = 0.5  # fraction of the residual that a cause leaves at most: else most of it has a different cause
 _MASS_RANGE = (-0.9, 4.0)  # possible error of a body's mass, as a fraction of it
 # bodies whose double mass changes the torque by a smaller fraction of its RMS are not supposed as causes
 _LEAST_MASS_EFFECT = 0.02
@@ -58,15 +56,12 @@ class Allowed:
         Largest lag of the torque, in both directions.
     loads_n : (float, float)
         Range of the foot load.
-    friction_nm : float
-        Largest constant torque that counts as friction.
     unexplained : float
         Fraction of the predicted RMS below which a torque counts as predicted.
     """
 
     lag_s: float
     loads_n: tuple[float, float]
-    friction_nm: float
     unexplained: float
 
 
@@ -133,27 +128,16 @@ def _reals(curve: Complex) -> Floats:
     return math.sqrt(2.0) * np.concatenate([curve.real, curve.imag], axis=-1)
 
 
-class _Causes(NamedTuple):
-    """Supposed causes: a reversed sign, a factor, a turned angle, a foot load, a body's mass."""
-
-    sign: int
-    is_scaled: bool
-    is_turned: bool
-    is_loaded: bool
-    body: str
-
-    @property
-    def number(self) -> int:
-        return (self.sign < 0) + self.is_scaled + self.is_turned + self.is_loaded + bool(self.body)
-
-
 @attrs.frozen(eq=False)
 class _Fit:
-    """Most probable values of some causes.
+    """Most probable values with a supposed cause.
 
     Attributes
     ----------
-    causes : _Causes
+    cause : Cause
+        UNKNOWN without a supposed cause.
+    body : str
+        The heavier body; empty for other causes.
     x : (4,) array
         Factor on the torque, angle [rad], foot load [N], and error of the body's mass as a fraction of it.
     unexplained : float
@@ -162,10 +146,15 @@ class _Fit:
         Minus the logarithm of the probability, less a constant.
     """
 
-    causes: _Causes
+    cause: Cause
+    body: str
     x: Floats
     unexplained: float
     unlikely: float
+
+
+_PLACES = {Cause.SIGN: 0, Cause.SCALE: 0, Cause.TIMING: 1, Cause.LOAD: 2, Cause.MASS: 3}
+"""Index of a cause's value in `_Fit.x`."""
 
 
 def explanation(
@@ -181,26 +170,22 @@ def explanation(
     samples = float(np.mean([one.torque_profile.number.sum() for one in cycles]))
     # a sample is taken as the mean over the period before it; the angle of an instant is half a period later
     lag_rad = allowed.lag_s * abs(speed) + 0.5 * TURN / samples
-    fits = [one for causes in _possible(curves) if (one := _fit(curves, causes, lag_rad, allowed))]
-    before = next(one for one in fits if not one.causes.number)
-    if before.unexplained <= allowed.unexplained:
+    before = _fit(curves, Cause.UNKNOWN, "", lag_rad, allowed)
+    if before is None or before.unexplained <= allowed.unexplained:
         return None
-    found = _chosen(fits, allowed.unexplained)
-    best, _ = _refined(curves, found[0] if found else before)
-    freedom = 2 * len(curves.measured)
-    factor, _, load_n, _ = best.x.tolist()
-    constant_nm = float(curves.means[0] - factor * (curves.means[1] + load_n * curves.means[2]))
-    constant_sigma_nm = best.unexplained * curves.size_nm / math.sqrt(freedom)
-    friction = math.copysign(constant_nm, constant_nm * speed * factor) / abs(factor)
+    causes = [(cause, "") for cause in (Cause.SIGN, Cause.SCALE, Cause.TIMING)]
+    causes += [(Cause.LOAD, "")] if np.any(curves.lever) else []
+    causes += [(Cause.MASS, name) for name in curves.bodies]
+    fits = [one for cause in causes if (one := _fit(curves, *cause, lag_rad, allowed))]
+    found = [_refined(curves, one) for one in _chosen(before, fits, allowed.unexplained)]
+    best = found[0][0] if found else before
     return TorqueExplanation(
-        alternatives=tuple(_named(*_refined(curves, one)) for one in found),
+        alternatives=tuple(_named(*one) for one in found),
         before=before.unexplained,
         after=best.unexplained,
-        after_sigma=best.unexplained / math.sqrt(2.0 * freedom),
+        after_sigma=best.unexplained / math.sqrt(4.0 * len(curves.measured)),
         limit=allowed.unexplained,
         speed_radps=speed,
-        bias=beyond_friction(friction, constant_sigma_nm, allowed.friction_nm),
-        cycles=len(cycles),
     )
 
 
@@ -212,103 +197,72 @@ def _body_torques(mechanism: Mechanism, speed: float) -> dict[str, Floats]:
     return {name: torque for name, torque in added if torque.std() > least}
 
 
-def _possible(curves: _Curves) -> Iterator[_Causes]:
-    """All sets of at most three causes; never both factor and mass, since they look too much alike."""
-    loads = (False, True) if np.any(curves.lever) else (False,)
-    factors = ((False, ""), (True, ""), *((False, name) for name in curves.bodies))
-    for sign in (1, -1):
-        for is_turned in (False, True):
-            for is_loaded in loads:
-                for is_scaled, body in factors:
-                    one = _Causes(sign, is_scaled, is_turned, is_loaded, body)
-                    if one.number <= _MOST_CAUSES:
-                        yield one
-
-
-def _fit(curves: _Curves, causes: _Causes, lag_rad: float, allowed: Allowed) -> _Fit | None:
-    """Most probable values of some causes on a grid of crank angles; None if no possible values fit."""
-    angles = _GRID_RAD if causes.is_turned else _GRID_RAD[np.abs(_GRID_RAD) <= lag_rad]
-    body = curves.bodies[causes.body] if causes.body else 0.0 * curves.lever
-    columns = _reals(np.stack([curves.predicted, curves.lever, body]))
-    turns = np.exp(-1j * np.outer(angles, np.arange(1, len(body) + 1)))
+def _fit(curves: _Curves, cause: Cause, body: str, lag_rad: float, allowed: Allowed) -> _Fit | None:
+    """Most probable values with a cause, on a grid of crank angles; None if no possible values fit."""
+    angles = _GRID_RAD if cause is Cause.TIMING else _GRID_RAD[np.abs(_GRID_RAD) <= lag_rad]
+    heavier = curves.bodies[body] if body else 0.0 * curves.lever
+    columns = _reals(np.stack([curves.predicted, curves.lever, heavier]))
+    turns = np.exp(-1j * np.outer(angles, np.arange(1, len(heavier) + 1)))
     measured = _reals(turns * curves.measured)  # turned back
     # least squares for factor, load and mass with their priors
-    middle_n, reach_n = 0.5 * sum(allowed.loads_n), 0.5 * (allowed.loads_n[1] - allowed.loads_n[0])
-    mean = np.array([causes.sign, causes.sign * middle_n * (not causes.is_loaded), 0.0])
-    sigma = np.array(
-        [
-            _ANY if causes.is_scaled else _SCALE_SIGMA,
-            _ANY_LOAD_N if causes.is_loaded else max(reach_n, 1.0e-6),
-            _MASS_SIGMA,
-        ]
+    sign, is_scaled, is_loaded = (
+        -1.0 if cause is Cause.SIGN else 1.0,
+        cause in (Cause.SIGN, Cause.SCALE),
+        cause is Cause.LOAD,
     )
-    weight = np.square(allowed.unexplained * curves.size_nm / sigma) / len(body)
+    middle_n, reach_n = 0.5 * sum(allowed.loads_n), 0.5 * (allowed.loads_n[1] - allowed.loads_n[0])
+    mean = np.array([sign, sign * middle_n * (not is_loaded), 0.0])
+    load_sigma_n = _ANY_LOAD_N if is_loaded else max(reach_n, 1.0e-6)
+    sigma = np.array([_ANY if is_scaled else _SCALE_SIGMA, load_sigma_n, _MASS_SIGMA])
+    weight = np.square(allowed.unexplained * curves.size_nm / sigma) / len(heavier)
     values = np.linalg.solve(
         columns @ columns.T + np.diag(weight), columns @ measured.T + (weight * mean)[:, None]
     )
     factor, load_n, mass = values[0], values[1] / values[0], values[2] / values[0]
     rest = np.sqrt(np.square(measured - values.T @ columns).sum(axis=1)) / (np.abs(factor) * curves.size_nm)
-    narrow = np.array([not causes.is_scaled, not causes.is_loaded, True])
+    narrow = np.array([not is_scaled, not is_loaded, True])
     beyond = np.square((values - mean[:, None]) / sigma[:, None])[narrow].sum(axis=0)
-    unlikely = 0.5 * len(body) * np.log(rest**2 + _MODEL_ERROR**2) + 0.5 * beyond
-    is_possible = (factor * causes.sign > 0.0) & (mass > _MASS_RANGE[0]) & (mass < _MASS_RANGE[1])
+    unlikely = 0.5 * len(heavier) * np.log(rest**2 + _MODEL_ERROR**2) + 0.5 * beyond
+    is_possible = (factor * sign > 0.0) & (mass > _MASS_RANGE[0]) & (mass < _MASS_RANGE[1])
     if not is_possible.any():
         return None
     best = int(np.where(is_possible, unlikely, np.inf).argmin())
     x = np.array([factor[best], angles[best], load_n[best], mass[best]])
-    return _Fit(causes, x, float(rest[best]), float(unlikely[best]) + SURE_LOG_ODDS * causes.number)
+    return _Fit(cause, body, x, float(rest[best]), float(unlikely[best]))
 
 
-def _chosen(fits: Sequence[_Fit], limit: float) -> list[_Fit]:
-    """The most probable causes, and as many others that explain equally well; empty if none explain more.
-
-    Of causes that explain the torque up to a limit, the fewest are enough.
-    """
-    best = min(fits, key=lambda one: one.unlikely)
-    enough = [one for one in fits if one.unexplained <= limit and one.causes.number < best.causes.number]
-    best = min(enough, key=lambda one: (one.causes.number, one.unlikely), default=best)
-    if not best.causes.number:
+def _chosen(before: _Fit, fits: Sequence[_Fit], limit: float) -> list[_Fit]:
+    """The most probable cause, and others that explain equally well; empty if none explains enough."""
+    found = sorted(
+        (one for one in fits if one.unexplained < _PART * before.unexplained), key=lambda one: one.unlikely
+    )
+    if not found or before.unlikely - found[0].unlikely < SURE_LOG_ODDS:
         return []
-    alike = [one for one in fits if one.causes.number == best.causes.number]
-    most = limit if best.unexplained <= limit else math.inf
-    found = [one for one in alike if one.unlikely - best.unlikely < SURE_OF_NAME and one.unexplained <= most]
-    return sorted(found, key=lambda one: one.unlikely)
+    most = limit if found[0].unexplained <= limit else math.inf
+    near = found[0].unlikely + SURE_OF_NAME
+    return [one for one in found if one.unlikely < near and one.unexplained <= most]
 
 
-def _refined(curves: _Curves, one: _Fit) -> tuple[_Fit, Floats]:
-    """A fit between the angles of the grid, and standard deviations (4,) of its values; 0 if fixed."""
-    causes, (factor, angle_rad, load_n, mass) = one.causes, one.x.tolist()
-    body = curves.bodies[causes.body] if causes.body else 0.0 * curves.lever
+def _refined(curves: _Curves, one: _Fit) -> tuple[_Fit, float]:
+    """A fit with its cause's value between the angles of the grid, and the value's standard deviation."""
+    factor, angle_rad, load_n, mass = one.x.tolist()
+    body = curves.bodies[one.body] if one.body else 0.0 * curves.lever
     base = _turned(curves.predicted + load_n * curves.lever + mass * body, angle_rad)
-    lever, heavier = _turned(curves.lever, angle_rad), _turned(body, angle_rad)
-    columns = _reals(np.stack([base, factor * _slope(base), factor * lever, factor * heavier]))
-    # the factor of a reversed torque is refined as well, because it is reported
-    free = [causes.is_scaled or causes.sign < 0, causes.is_turned, causes.is_loaded, bool(causes.body)]
-    kept = np.flatnonzero(free)
-    residual = _reals(curves.measured - factor * base)
-    step = solved(columns[kept].T, residual) if len(kept) else np.zeros(0)
-    rest = residual - step @ columns[kept]
-    x, sigma = one.x.copy(), np.zeros(4)
-    x[kept] += step
-    scatter = float(rest @ rest) / (len(rest) - len(kept))
-    sigma[kept] = np.sqrt(scatter * np.diagonal(np.linalg.inv(columns[kept] @ columns[kept].T)))
+    slopes = (
+        base,
+        factor * _slope(base),
+        *(factor * _turned(each, angle_rad) for each in (curves.lever, body)),
+    )
+    place = _PLACES[one.cause]
+    column, residual = _reals(slopes[place]), _reals(curves.measured - factor * base)
+    step = float(column @ residual) / float(column @ column)
+    rest, x = residual - step * column, one.x.copy()
+    x[place] += step
+    sigma = math.sqrt(float(rest @ rest) / (len(rest) - 1) / float(column @ column))
     unexplained = math.sqrt(float(rest @ rest)) / (abs(float(x[0])) * curves.size_nm)
     return attrs.evolve(one, x=x, unexplained=min(unexplained, one.unexplained)), sigma
 
 
-def _named(one: _Fit, sigma: Floats) -> tuple[NamedCause, ...]:
-    """The causes of a fit with standard deviations (4,)."""
-    of, (factor, angle_rad, load_n, mass) = one.causes, one.x.tolist()
-    factor_sigma, angle_sigma, load_sigma, mass_sigma = sigma.tolist()
-    causes = []
-    if of.sign < 0:
-        causes.append(NamedCause(Cause.SIGN, factor, factor_sigma))
-    if of.is_scaled:
-        causes.append(NamedCause(Cause.SCALE, abs(factor), factor_sigma))
-    if of.is_turned:
-        causes.append(NamedCause(Cause.TIMING, angle_rad, angle_sigma))
-    if of.is_loaded:
-        causes.append(NamedCause(Cause.LOAD, load_n, load_sigma))
-    if of.body:
-        causes.append(NamedCause(Cause.MASS, mass, mass_sigma, of.body))
-    return tuple(causes)
+def _named(one: _Fit, sigma: float) -> NamedCause:
+    """The cause of a fit with its value."""
+    return NamedCause(one.cause, float(one.x[_PLACES[one.cause]]), sigma, one.body)

@@ -321,7 +321,6 @@ class TorqueWatch(Observer):
         return Allowed(
             lag_s=config.drive.largest_lag_s,
             loads_n=LOADS_N,
-            friction_nm=self._leg.twin.max_friction_nm,
             unexplained=WARN_FRACTION * config.limits.torque_mismatch,
         )
 
@@ -343,8 +342,8 @@ class TorqueWatch(Observer):
     def _drive(self, diagnosis: Diagnosis) -> Drive:
         """The drive by the last gait cycle, by the explanation of a torque residual, and by the diagnosis."""
         last, explained = self._leg.last, self.explained
-        named = explained.named if explained else ()
-        factor = next((one for one in named if one.cause in _FACTORS), None)
+        named = explained.named if explained else None
+        factor = named if named and named.cause in _FACTORS else None
         bandwidth_hz = diagnosis.channel.bandwidth_hz
         return Drive(
             scale=_estimate(factor.value, factor.sigma) if factor else None,
@@ -373,9 +372,7 @@ class TorqueWatch(Observer):
         """Cause of the torque: an unsettled change of the leg, or else a torque residual's only cause."""
         if diagnosis.state is DiagnosisState.CHANGED and diagnosis.changes:
             return diagnosis.changes[-1]
-        explained = self.explained
-        named = explained.named if explained else ()
-        return named[0] if len(named) == 1 else None
+        return self.explained.named if self.explained else None
 
     @property
     def statuses(self) -> Sequence[Status]:
@@ -409,7 +406,7 @@ class TorqueWatch(Observer):
             by = f": {explanation_words(explained, diagnosis)}" if explained else ""
             messages = [f"the measured torque differs from the prediction{by}"]
             values |= _explained_values(explained) if explained else {}
-            code = explained.named[0].cause.fault_code if explained and explained.named else code
+            code = explained.named.cause.fault_code if explained and explained.named else code
         if causes is not None:  # those are estimates for the torque as received
             messages += [sentence(one, diagnosis) for one in causes.values()]
             past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in causes]
@@ -465,7 +462,7 @@ def _estimate(value: float, sigma: float) -> Estimate | None:
 def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
     """Values of the first explanation of a torque residual, and the remaining residual."""
     values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
-    for one in explained.alternatives[0] if explained.alternatives else ():
+    for one in explained.alternatives[:1]:
         row = words_of_cause(one.cause)
         name = f"{row.name}_{one.subject}".rstrip("_")
         values |= {with_unit(name, row.unit): one.value, with_unit(f"{name}_sigma", row.unit): one.sigma}

@@ -195,7 +195,7 @@ class Diagnosis:
             return False
         causes = {each.cause for each in self.changes if each.is_named and not each.is_corrected}
         codes = {cause.fault_code for cause in causes - {Cause.NOISE, Cause.UNKNOWN}}
-        return bool(codes) and codes.isdisjoint(one.cause.fault_code for one in explained.named)
+        return bool(codes) and (explained.named is None or explained.named.cause.fault_code not in codes)
 
 
 WINDOW_CYCLES = 60  # gait cycles that are kept per cadence and used for the estimate of clearances

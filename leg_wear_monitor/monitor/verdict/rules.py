@@ -50,7 +50,6 @@ from leg_wear_monitor.twin import TORQUE
 
 # grease is stiff in the cold, and a warm motor has less torque
 _WITH_TEMPERATURE = (Cause.FRICTION, Cause.LOAD_FRICTION, Cause.SCALE)
-_SURE = 3.0  # standard deviations
 _MOST = 3  # alternatives in words
 
 
@@ -97,15 +96,10 @@ def explanation(explained: TorqueExplanation, found: Diagnosis | None = None) ->
     rest = estimate(explained.after, explained.after_sigma, "")
     left = f"{rest} of the predicted RMS stays unexplained: the mechanism or a clearance may have changed"
     if not explained.alternatives:
-        return f"no fault of a sensor, a load or a mass explains half of the difference; {left}"
-    alternatives = [
-        " and ".join(sentence(one, found) for one in causes) for causes in explained.alternatives[:_MOST]
-    ]
-    words = ", or ".join(alternatives)
-    if len(alternatives) > 1:
+        return f"no single fault of a sensor, no load and no mass explains the difference; {left}"
+    words = ", or ".join(sentence(one, found) for one in explained.alternatives[:_MOST])
+    if len(explained.alternatives) > 1:
         words += " (each explains the torque equally well)"
-    if abs(explained.bias.value) > _SURE * explained.bias.sigma:
-        words += f"; {sentence(explained.bias, found)}"
     return words if explained.is_whole else f"{words}; {left}"
 
 
@@ -239,19 +233,20 @@ def has_cause(code: str) -> Condition:
 
 
 def _explained(code: str, situation: Situation) -> list[Hit]:
-    """An explained torque residual whose first cause has this code."""
+    """An explained torque residual whose cause has this code."""
     explained = situation.explained
-    if explained is None or not explained.named or explained.named[0].cause.fault_code != code:
+    named = explained.named if explained else None
+    if explained is None or named is None or named.cause.fault_code != code:
         return []
     alarms = raised("torque_mismatch", least=Level.WARN)(situation)
     return [
         Hit(
             words={
                 "causes": f": {explanation(explained, situation.diagnosis)}",
-                "remedy": " and ".join(map(remedy, explained.named)),
+                "remedy": remedy(named),
             },
             since_ns=alarms[0].since_ns if alarms else 0,
-            evidence=tuple(map(evidence_of, explained.named)),
+            evidence=(evidence_of(named),),
             state=State.INSPECT,
         )
     ]

@@ -89,10 +89,10 @@ def shown(cause: Cause, subject: str = "") -> dict[str, Any]:
 
 
 def explained(*causes: Cause, **values: Any) -> TorqueExplanation:
-    """One explanation, with made-up values."""
-    named = tuple(NamedCause(cause, -0.5, 0.01, "foot" if cause.name == "MASS" else "") for cause in causes)
+    """Explanations, with made-up values."""
+    found = tuple(NamedCause(cause, -0.5, 0.01, "foot" if cause.name == "MASS" else "") for cause in causes)
     given = {"before": 2.0, "after": 0.03, "after_sigma": 0.01, "limit": 0.08, "speed_radps": 6.3} | values
-    return TorqueExplanation(alternatives=(named,), **given)
+    return TorqueExplanation(alternatives=found, **given)
 
 
 def noted(code: str, text: str) -> dict[str, Any]:
@@ -278,7 +278,7 @@ def test_every_rule_is_the_verdict_of_some_case() -> None:
     [
         ((Cause.MASS,), 0.03, {}, True),
         ((Cause.LOAD, Cause.MASS), 0.9, {}, True),  # not named: what is left may be friction
-        ((Cause.SIGN, Cause.MASS), 0.03, {}, False),  # as received, no gait cycle of it is used
+        ((Cause.SIGN,), 0.03, {}, False),  # as received, no gait cycle of it is used
         ((Cause.MASS,), 0.03, {"runner_up": "G", "runner_up_log_odds": 9.0}, False),
         ((Cause.MASS,), 0.03, {"is_corrected": True}, False),
         ((Cause.MASS,), 0.03, {"cause": Cause.MASS}, False),
@@ -309,7 +309,7 @@ def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(cause, values, k
     one = NamedCause(cause, sigma=0.01, **values)
     by_diagnosis = judged(diagnosis=diagnosis(change(cause, sigma=0.01, counted=0.0, **values)))
     if kind is None:
-        found = attrs.evolve(explained(), alternatives=((one,),))
+        found = attrs.evolve(explained(), alternatives=(one,))
         other = judged(alarms=(alarm("torque_mismatch"),), explained=found)
     else:
         other = judged(alarms=(alarm(kind),), torque_causes={kind: one})

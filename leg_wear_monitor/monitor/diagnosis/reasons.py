@@ -1,4 +1,7 @@
-"""Why there is no estimate of the clearances yet, or why it is not sure, and the next step."""
+"""Why there is no estimate of the clearances yet, or why it is not sure, and the next step.
+
+The sentences are in config/verdict.yaml, by their codes.
+"""
 
 import itertools
 import math
@@ -18,70 +21,58 @@ from leg_wear_monitor.monitor.diagnosis.state import (
     NotUsed,
     TorqueState,
 )
+from leg_wear_monitor.monitor.sentences import verdict_document
 
-_IRREGULAR = "the stamps of the drive torque are too irregular, or their rate has changed"
-# in a ramp of 30 rpm per minute, two or three neighbouring cycles look alike
-_CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3
+
+def _words(code: str, **values: object) -> str:
+    return str(verdict_document()["reasons"][code]).format(**values)
 
 
 def missing(state: TorqueState, references: References, config: MonitorConfig) -> str:
     """Reason why there is no estimate."""
+    last, own, percent = state.unused[-UNUSABLE_CYCLES:], config.cadence, references.percent
     if not math.isnan(state.off_cadence_rpm):
-        own = config.cadence
-        return (
-            f"the cadence is {state.off_cadence_rpm:.3g} rpm, not the commanded "
-            f"{own.commanded_rpm:.3g} ± {own.tolerance_rpm:.3g} rpm"
-        )
-    if state.unused[-1:] == (NotUsed.JITTER,):
-        return _IRREGULAR
+        rpm = (state.off_cadence_rpm, own.commanded_rpm, own.tolerance_rpm)
+        return _words("off_cadence", **dict(zip(("now", "commanded", "tolerance"), rpm, strict=True)))
+    if last[-1:] == (NotUsed.JITTER,):
+        return _words("irregular")
     if state.failure:
-        return f"not observable, because no possible leg explains the drive torque ({state.failure})"
-    if state.sensor is None or state.unused[-UNUSABLE_CYCLES:] == (NotUsed.GAP,) * UNUSABLE_CYCLES:
-        return "no drive torque with enough samples in a gait cycle"
+        return _words("impossible", why=state.failure)
+    if state.sensor is None or last == (NotUsed.GAP,) * UNUSABLE_CYCLES:
+        return _words("no_torque")
     if not state.sensor.phases:
-        return "the drive torque has too few samples in a gait cycle"
+        return _words("few_samples")
     if state.reference is None and references.is_busy:
-        return f"the reference for this leg is being simulated: {references.percent} %"
+        return _words("simulated", percent=percent)
     if state.has_failed:
-        return "the leg could not be simulated for a reference"
-    if state.unused[-1:] == (NotUsed.UNLIKE,):
-        return _other_cadence(state, references)
-    if not state.is_compared:
-        return _not_compared(state)
+        return _words("not_simulated")
+    if last[-1:] == (NotUsed.UNLIKE,) or not state.is_compared:
+        return _not_compared(state, references)
     cycles = state.waiting if state.reference is None else state.cycles
     if state.reference is None or len(cycles) < FIRST_CYCLES:
-        return f"gait cycles: {len(cycles)} of {FIRST_CYCLES}"
-    return "the drive torque does not fit the mechanism file (late, filtered, loaded, or of a different leg)"
+        return _words("few_cycles", number=len(cycles), of=FIRST_CYCLES)
+    return _words("unlike")
 
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     """Why an estimate is not sure; empty if it is."""
-    if state.unused[-UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * UNUSABLE_CYCLES:
-        return _other_cadence(state, references)
-    if state.unused[-UNUSABLE_CYCLES:] == (NotUsed.JITTER,) * UNUSABLE_CYCLES:
-        return _IRREGULAR
-    if not state.is_compared:
-        return _not_compared(state)
+    last = state.unused[-UNUSABLE_CYCLES:]
+    if last == (NotUsed.UNLIKE,) * UNUSABLE_CYCLES or not state.is_compared:
+        return _not_compared(state, references)
+    if last == (NotUsed.JITTER,) * UNUSABLE_CYCLES:
+        return _words("irregular")
     if models.is_sure(state):
         return _doubt_of_known_leg(state, models.explainer(state).joints)
     if state.sensor and state.is_narrow:
-        hz = state.sensor.channel.bandwidth_hz
-        return f"the drive passes only {hz:.0f} Hz of the torque: names are uncertain, no joint is corrected"
-    known = "the model does not fit this leg, so the names of joints are uncertain: "
-    if not state.changes:
-        known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
-    if state.load and references.is_load_left_out(state):
-        carried = f"about {state.load.peak_n:.0f} ± {state.load.peak_sigma_n:.0f} N in stance"
-        return f"{known}the foot carries {carried}; set load.model to ground"
+        return _words("narrow", hz=state.sensor.channel.bandwidth_hz)
+    known, load = _words("uncertain" if state.changes else "unchanged"), state.load
+    if load and references.is_load_left_out(state):
+        return known + _words("load", peak_n=load.peak_n, sigma_n=load.peak_sigma_n)
     if references.is_busy:
-        return f"{known}{_simulated(state)} being simulated, {references.percent} %"
-    if state.load and not state.load.is_sure and not math.isnan(state.load.other_n):
-        sizes = f"{state.load.peak_n:.0f} N and {state.load.other_n:.0f} N explain its torque equally well"
-        return f"{known}the force on the foot is not observable: {sizes}"
-    return (
-        f"{known}masses, lengths and friction near those of the file do not explain its drive torque; "
-        "behind a belt or a soft coupling, declare drive.stiffness_nm_per_rad"
-    )
+        return known + _words("simulated", percent=references.percent)
+    if load and not load.is_sure and not math.isnan(load.other_n):
+        return known + _words("two_loads", peak_n=load.peak_n, other_n=load.other_n)
+    return known + _words("other_leg")
 
 
 def _doubt_of_known_leg(state: TorqueState, joints: Sequence[str]) -> str:
@@ -89,15 +80,9 @@ def _doubt_of_known_leg(state: TorqueState, joints: Sequence[str]) -> str:
     known = state.commissioned
     if state.fit is None or known is None or state.changes:
         return ""
-    hidden = ", ".join(itertools.compress(joints, known.is_unknown))
-    if hidden:
-        return f"{hidden} may have opened with the joint that was corrected: measure them"
-    if state.fit.explains:
-        return ""
-    return (
-        "the drive torque does not fit the commissioned leg, and no clearance explains this; if the sensor "
-        "was changed, reset a joint and undo the reset: the leg is then commissioned again"
-    )
+    if known.is_unknown.any():
+        return _words("hidden", joints=", ".join(itertools.compress(joints, known.is_unknown)))
+    return "" if state.fit.explains else _words("other_torque")
 
 
 def other_sensor(state: TorqueState) -> str:
@@ -105,34 +90,14 @@ def other_sensor(state: TorqueState) -> str:
     sensor = state.sensor
     if sensor is None or state.commissioned is not None or all(one.is_of(sensor) for one in state.baselines):
         return ""
-    return "the baseline has a torque sensor with a different rate or sampling: the leg is commissioned again"
+    return _words("other_sensor")
 
 
-def _not_compared(state: TorqueState) -> str:
-    """Message on the gait cycles that are not tested for changes."""
+def _not_compared(state: TorqueState, references: References) -> str:
+    """Message on gait cycles that are not tested for changes."""
     if state.is_load_other:
-        return (
-            "the load at the foot differs from the reference: no clearance is observable before the leg is "
-            "commissioned under this load"
-        )
-    rpm = sorted(60.0 * abs(one.speed) / TURN for one in state.compared_at)
-    at = ", ".join(f"{one:.3g}" for one in rpm)
-    return f"changes at this cadence cannot be observed yet, but they can at {at} rpm"
-
-
-def _is_changing(state: TorqueState) -> bool:
-    """True if the cadence changes: only a few of the last gait cycles are alike."""
-    last = (NotUsed.UNLIKE,) * _CHANGING_CYCLES
-    return state.unused[-_CHANGING_CYCLES:] == last and len(state.waiting) <= _ALIKE_CYCLES
-
-
-def _other_cadence(state: TorqueState, references: References) -> str:
-    """Message on the use of gait cycles whose crank motion differs from the reference."""
-    if _is_changing(state):
-        now = f", now {abs(state.waiting[-1].profile.cadence_rpm):.3g} rpm" if state.waiting else ""
-        return f"not observable while the cadence changes{now}"
-    known = "not observable at this cadence before it has a reference"
-    return f"{known}: {references.percent} % is simulated" if references.is_busy else known
+        return _words("other_load")
+    return _words("at_cadence_soon" if references.is_busy else "at_cadence", percent=references.percent)
 
 
 def next_step(state: TorqueState, references: References, config: MonitorConfig) -> str:
@@ -140,34 +105,20 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     is_hopeless = state.has_failed or not (state.sensor and state.sensor.phases)
     if is_hopeless or not math.isnan(state.off_cadence_rpm):
         return ""
+    if references.is_late:
+        return _words("late")
     commanded_s = 60.0 / abs(config.cadence.commanded_rpm)
     last = state.waiting[-1:] if state.is_elsewhere else state.cycles[-1:]
     cycle_s = TURN / abs(last[0].profile.speed) if last else commanded_s
-    if references.is_late:
-        return f"{_simulated(state)} being simulated, with a delay because this machine is too busy"
     if references.is_busy:
-        left_s = references.cycles_left * commanded_s
-        then = "; then a reference with these values is simulated" if state.is_identifying else ""
-        return f"{_simulated(state)} ready after {_cycles(left_s / cycle_s, cycle_s)}{then}"
-    if state.reference is None:
-        return f"a reference will be chosen after {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
-    if state.is_elsewhere:
-        left = UNLIKE_CYCLES - len(state.waiting)
-        return "" if _is_changing(state) else f"its reference will be started after {_cycles(left, cycle_s)}"
-    if state.commissioned is None and not state.changes:
-        left = COMMISSIONING_CYCLES - len(state.cycles)
-        return f"a baseline for smaller changes will be complete after {_cycles(left, cycle_s)}"
-    return ""
-
-
-def _simulated(state: TorqueState) -> str:
-    """Subject and verb of a sentence on the running simulation."""
-    if not state.is_identifying:
-        return "a reference for the leg is"
-    return "its masses, lengths and friction are" if state.rounds else "the leg under the ground's force is"
-
-
-def _cycles(number: float, cycle_s: float) -> str:
-    """A number of further gait cycles, and the time that they take."""
-    whole = max(1, math.ceil(number))
-    return f"{whole} more gait cycle{'s' if whole > 1 else ''} ({whole * cycle_s:.0f} s of walking)"
+        code = "identified" if state.is_identifying else "reference"
+        left = references.cycles_left * commanded_s / cycle_s
+    elif state.is_elsewhere:
+        most = UNLIKE_CYCLES if state.reference else FIRST_CYCLES
+        code, left = "begun", float(most - len(state.waiting))
+    elif state.commissioned is None and not state.changes:
+        code, left = "baseline", float(COMMISSIONING_CYCLES - len(state.cycles))
+    else:
+        return ""
+    cycles = max(1, math.ceil(left))
+    return _words(f"after_{code}", cycles=cycles, seconds=cycles * cycle_s)

@@ -8,13 +8,12 @@ from functools import cache
 
 import attrs
 
-from leg_wear_monitor.configuration.strict import read_document, structure
+from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.estimate.cause import Cause
-from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarms import amount, guide_of
+from leg_wear_monitor.monitor.sentences import TABLE_FILE, verdict_document
 from leg_wear_monitor.state import Evidence, Figure, LegState, Level, State, Verdict
 
-TABLE_FILE = "config/verdict.yaml"
 ALARM, NONE, NO_GAIT_CYCLE = "ALARM", "NONE", "NO_GAIT_CYCLE"
 _HUNDRED = 100
 
@@ -169,6 +168,8 @@ class VerdictTable:
         By code, in the order of precedence among equal states.
     causes : dict of str to CauseWords
         By the name of the cause.
+    reasons : dict of str to str
+        Sentences on an estimate from the drive torque that is missing or unsure, and on the next result.
     measured : dict of str to MeasuredFigure
     measurement : dict of str to str
         Sentences on a clearance that an operator has measured.
@@ -184,6 +185,7 @@ class VerdictTable:
     advice: dict[str, Advice]
     rules: dict[str, Rule]
     causes: dict[str, CauseWords]
+    reasons: dict[str, str]
     measured: dict[str, MeasuredFigure]
     measurement: dict[str, str]
     codes: dict[str, str]
@@ -199,7 +201,7 @@ def table() -> VerdictTable:
     ConfigError
         If the file is damaged.
     """
-    return structure(read_document(share_directory() / TABLE_FILE, TABLE_FILE), VerdictTable, TABLE_FILE, "")
+    return structure(verdict_document(), VerdictTable, TABLE_FILE, "")
 
 
 @cache

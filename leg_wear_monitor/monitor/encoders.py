@@ -129,11 +129,6 @@ def blind_directions(columns: Floats, counts: Floats) -> Floats:
     return np.asarray(vt[shown <= _BLIND * s[0]] / length)
 
 
-def rms(values: Floats) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 # Clearance estimates from the joint states: a regression on the angles of further joints, cycle by cycle.
 #
 # Each gait cycle gives an estimate of all clearances and of the encoders' own errors, robust against
@@ -181,11 +176,7 @@ class ClearanceRegression:
         self._cycles: list[tuple[Floats, Floats]] = []
         self._each: list[Floats] = []
 
-    def add(self, crank_angle: Floats, angles: Floats) -> None:
-        """Add the samples of a gait cycle: crank (n,) and encoder angles (n, m) [rad], NaN where absent."""
-        self.add_binned(*binned(self._model, crank_angle, angles))
-
-    def add_binned(self, deviation: Floats, counts: Floats) -> None:
+    def add(self, deviation: Floats, counts: Floats) -> None:
         """Add a gait cycle as returned by `binned`."""
         self._cycles.append((deviation, counts))
         if self._reference is not None:
@@ -204,20 +195,20 @@ class ClearanceRegression:
     def _regressed(self, deviation: Floats, counts: Floats) -> Floats:
         reference, before = self._given()
         joints = before.joints
-        columns = self._columns(counts)
+        columns = self._columns
         # the prior is expressed at the linearisation point: at the clearances of the reference
         shift = reference.deviation - columns[:, :, :joints] @ reference.clearance_m
         return regress(columns, deviation - shift, counts, before)
 
-    def _columns(self, counts: Floats) -> Floats:
-        """Columns of the regression for the available encoders, given the counts (P, m) of their samples.
+    @property
+    def _columns(self) -> Floats:
+        """Columns of the regression.
 
         Joints without a direct effect are excluded: an effect through other joints alone is not
         proportional to the clearance and would give wrong estimates.
         """
         reference, before = self._given()
-        there = counts.any(axis=0)
-        shown = self._model.by_e[:, there].any(axis=(0, 1, 3))
+        shown = self._model.by_e.any(axis=(0, 1, 3))
         columns = reference.columns.copy()
         columns[:, :, : before.joints][:, :, ~shown] = 0.0
         return columns
@@ -261,7 +252,7 @@ class ClearanceRegression:
             return None
         _, before = self._given()
         counts = np.sum([counts for _, counts in self._cycles], axis=0)
-        blind = blind_directions(self._columns(counts), counts)
+        blind = blind_directions(self._columns, counts)
         # in unobservable directions, each cycle repeats the prior and adds no information
         scale = np.sqrt(np.diagonal(before.covariance))
         across = blind / scale
@@ -382,12 +373,6 @@ class EncoderState:
         Samples of the crank, with the encoders' angles, of gait cycles that are not evaluated yet.
     due : tuple of (int, int)
         Begin and end [ns] of ended gait cycles that are not evaluated yet.
-    present : tuple of bool
-        True if the cycles of the estimate have each encoder; empty before the first cycle.
-    changed_present : tuple of bool
-        The same of the last cycles, if it differs from `present`; empty otherwise.
-    changed_cycles : int
-        Number of these cycles.
     faults : tuple of str
         Fault of each encoder in the last cycle; empty before the first.
     is_requested : bool
@@ -410,9 +395,6 @@ class EncoderState:
     errors: EncoderErrors
     samples: Samples = attrs.field(factory=lambda: np.zeros(0, GAIT_SAMPLE))
     due: tuple[tuple[int, int], ...] = ()
-    present: tuple[bool, ...] = ()
-    changed_present: tuple[bool, ...] = ()
-    changed_cycles: int = 0
     faults: tuple[str, ...] = ()
     is_requested: bool = False
     since_reference: int = 0
@@ -429,7 +411,7 @@ def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
     finite = deviation[np.isfinite(deviation)]
     if len(finite) < _LEAST_PHASES:
         return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
-    if rms(finite - finite.mean()) > _FAULTY_RAD:
+    if float(finite.std()) > _FAULTY_RAD:
         return f"does not turn like joint {joint}: check encoders.joints and encoders.signs"
     return ""
 
@@ -445,8 +427,6 @@ def faults(names: Sequence[str], state: EncoderState) -> list[str]:
 # replay gives the same results. A period evaluates the gait cycles that ended in it. The cycles are compared
 # with a reference, a simulation of the leg as modelled.
 
-
-_CHANGE_CYCLES = 20  # cycles in a row with other encoders until the change counts as permanent
 
 _MODEL_M = 5.0e-6  # standard deviation of a modelled clearance apart from the error of the new one
 _UNKNOWN_SIGMA_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
@@ -560,7 +540,7 @@ class EncoderWatch(Observer):
         return (ClearanceEstimate(observation=observation),) * len(modelled_m)
 
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
-        """Add a gait cycle to the regression, unless other encoders are present than before."""
+        """Add a gait cycle to the regression, unless an encoder has a fault."""
         state = self.state
         kept = within(state.samples, begin_ns, end_ns)
         stamp_ns, crank = kept["stamp_ns"], kept["crank_angle_rad"]
@@ -576,34 +556,13 @@ class EncoderWatch(Observer):
         state.faults = tuple(
             fault_of(raw[:, i], deviation[:, i], joint) for i, joint in enumerate(self._settings.joints)
         )
-        present = tuple(not fault for fault in state.faults)
-        if present != state.present and not self._accept_change(present):
-            return
-        absent = [not here for here in present]
-        deviation[:, absent], counts[:, absent] = np.nan, 0.0
-        if any(present):
+        if not any(state.faults):
             settings = self._settings
             self._regression.most = (
                 settings.window_cycles if state.errors.known else settings.commissioning_cycles
             )
-            self._regression.add_binned(deviation, counts)
+            self._regression.add(deviation, counts)
             state.since_reference += 1
-
-    def _accept_change(self, present: tuple[bool, ...]) -> bool:
-        """Count a cycle with other encoders; if the change is permanent, start the estimate again with these.
-
-        Returns whether the change was accepted. A change for a few cycles only (lost messages) is ignored.
-        """
-        state = self.state
-        state.changed_cycles = state.changed_cycles + 1 if present == state.changed_present else 1
-        state.changed_present = present
-        if state.present and state.changed_cycles < _CHANGE_CYCLES:
-            return False
-        state.present, state.changed_present, state.changed_cycles = present, (), 0
-        state.found = None
-        self._regression.forget()
-        self._evaluate_again()
-        return True
 
     def _centre(self, crank: Floats, angles: Floats) -> None:
         """Set the centre of each encoder that has none to its mean deviation in this cycle."""
@@ -620,12 +579,12 @@ class EncoderWatch(Observer):
     def _evaluate(self, stamp_ns: int) -> Commissioned | None:
         """Renew the estimate; during commissioning, fix the encoders' errors when there are enough cycles."""
         state, regression = self.state, self._regression
-        if regression.reference is None or not any(state.present):
+        if regression.reference is None:
             return None
         if state.errors.known:
             state.found = regression.fused()
             return None
-        is_due = all(state.present) and regression.cycles >= self._settings.commissioning_cycles
+        is_due = regression.cycles >= self._settings.commissioning_cycles
         found = regression.fused() if is_due else None
         if found is None:
             return None
@@ -641,7 +600,7 @@ class EncoderWatch(Observer):
         if reference is not None:
             state.since_reference = 0
             self._regression.refer(reference, self._prior(reference.clearance_m))
-        if self._reference.is_busy or not any(state.present):
+        if self._reference.is_busy or not self._regression.cycles:
             return
         if not state.is_requested and state.profiles:
             state.is_requested = True

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
-from leg_wear_monitor.twin.reference import HARMONICS, POINTS, CrankProfile, LegParameters
+from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
 from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear import SECTORS
 
@@ -161,7 +161,7 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
             if str(parts["fingerprint"]) != fingerprint(mechanism) or (joints, tuple(bodies)) != order:
                 return (), name
             references = range(int(parts["references"]))
-            found = tuple(_reference(parts, i, len(bodies), len(joints)) for i in references)
+            found = tuple(_reference(parts, i, len(joints)) for i in references)
             if not found:
                 raise ValueError("it contains no reference")
             return found, name
@@ -174,41 +174,16 @@ def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference
         ) from error
 
 
-def _reference(parts: Any, i: int, bodies: int, joints: int) -> TorqueReference:
-    """Reference number i of an archive; raises ValueError for impossible values."""
-    clearance_m = _checked(parts, f"clearance_m_{i}", (None, joints))
-    ends, torque = np.cumsum(parts[f"cycles_{i}"]), _checked(parts, f"torque_nm_{i}", (None, POINTS))
-    if len(ends) != len(clearance_m) or ends[0] < 1 or ends[-1] != len(torque) or (np.diff(ends) < 1).any():
-        raise ValueError(f"cycles_{i} does not divide torque_nm_{i} among {len(clearance_m)} legs")
-    cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
-    mass, length = (_checked(parts, f"{name}_{i}", (bodies,)) for name in ("mass", "length"))
-    numbers = ("friction", "speed_radps", "compliance_rad_per_nm", "damping_ratio", "load_sigma")
-    friction, speed, compliance, damping, load_sigma = (
-        float(_checked(parts, f"{name}_{i}", ())) for name in numbers
-    )
-    load = parts[f"load_n_{i}"]  # none in the air
-    load = _checked(parts, f"load_n_{i}", (None, 2)) if load.size else np.zeros((0, 2))
-    for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
-        if not (values > 0.0).all():
-            raise ValueError(f"a {name} is not above 0")
-    if min(friction, compliance, damping, load_sigma) < 0.0 or speed == 0.0:
-        raise ValueError("friction, compliance, damping or a sigma is below 0, or speed is 0")
-    leg = LegParameters(mass, length, friction, compliance, damping, load, load_sigma)
-    profile, torque_nm = CrankProfile(speed, cosine, sine), tuple(np.split(torque, ends[:-1]))
-    found = TorqueReference(profile, clearance_m, torque_nm, leg)
-    others = len(ends) - 1 - found.of_masses.size - found.of_frictions.size
+def _reference(parts: Any, i: int, joints: int) -> TorqueReference:
+    """Reference number i of an archive."""
+    names = ("friction", "compliance_rad_per_nm", "damping_ratio")
+    friction, compliance, damping = (float(parts[f"{name}_{i}"]) for name in names)
+    mass, length, load = (parts[f"{name}_{i}"] for name in ("mass", "length", "load_n"))
+    leg = LegParameters(mass, length, friction, compliance, damping, load, float(parts[f"load_sigma_{i}"]))
+    profile = CrankProfile(float(parts[f"speed_radps_{i}"]), *parts[f"ripple_rad_{i}"])
+    torque_nm = np.split(parts[f"torque_nm_{i}"], np.cumsum(parts[f"cycles_{i}"])[:-1])
+    found = TorqueReference(profile, parts[f"clearance_m_{i}"], tuple(torque_nm), leg)
+    others = len(torque_nm) - 1 - found.of_masses.size - found.of_frictions.size
     if others % joints:
         raise ValueError(f"its {others} wider legs are not the same number for each of {joints} joints")
-    return found
-
-
-def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:
-    """An array of finite numbers with a given shape; None stands for any length above 0."""
-    found = parts[name]
-    fits = len(found.shape) == len(shape) and all(
-        own == wanted if wanted is not None else own > 0
-        for own, wanted in zip(found.shape, shape, strict=True)
-    )
-    if found.dtype.kind != "f" or not fits or not np.isfinite(found).all():
-        raise ValueError(f"{name} has a wrong shape, or is not finite")
     return found

@@ -17,7 +17,13 @@ from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.encoders import ClearanceRegression, clearance_estimates, errors_of, prior_with
+from leg_wear_monitor.monitor.encoders import (
+    ClearanceRegression,
+    binned,
+    clearance_estimates,
+    errors_of,
+    prior_with,
+)
 from leg_wear_monitor.monitor.encoders import commissioned as commissioned_errors
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.monitor.ledger.file import read as read_records
@@ -181,14 +187,14 @@ def test_what_encoders_show_does_not_depend_on_blocks(commissioned, read):
 @pytest.mark.parametrize(
     "value, words", [(math.nan, "is not in joint_states with the crank"), (math.inf, "gives no angle")]
 )
-def test_an_encoder_that_says_nothing_is_reported_and_the_others_go_on(new_watch, read, value, words):
+def test_an_encoder_that_says_nothing_is_reported_and_no_cycle_is_used(new_watch, read, value, words):
     monitor = new_watch()
     samples = read(3.5)
     samples["encoder_rad"][:, 1] = value
     monitor.update(samples)
     assert status_of(monitor, "encoders").level is Level.WARN
     assert status_of(monitor, "encoders").message.startswith(f"knee {words}")
-    assert monitor._leg.encoders.state.present == (True, False, True)
+    assert status_of(monitor, "encoders").values["cycles"] == 0.0
     assert len(monitor.status()[1].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 
@@ -292,7 +298,7 @@ def watched(model, shape, simulated_reference, before, clearance, cycles=40, **m
     """Encoders watched over cycles."""
     hidden = ClearanceRegression(model, simulated_reference, before)
     for seed in range(cycles):
-        hidden.add(*read_cycle(model, shape, clearance, seed=seed, **more))
+        hidden.add(*binned(model, *read_cycle(model, shape, clearance, seed=seed, **more)))
     return hidden
 
 
@@ -323,7 +329,7 @@ def test_outliers_do_no_harm(model, shape, simulated_reference):
     for seed in range(30):
         crank, angles = read_cycle(model, shape, WORN, seed=seed, noise=1e-4)
         angles[seed::20] += 0.5
-        hidden.add(crank, angles)
+        hidden.add(*binned(model, crank, angles))
     np.testing.assert_allclose(hidden.fused().clearance_m, WORN, atol=2e-5)
 
 
@@ -334,15 +340,17 @@ def test_too_few_cycles_say_nothing(model, shape, simulated_reference):
     )
 
 
-def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, simulated_reference):
-    """What was known before stays, mean and deviation."""
+def test_the_hip_alone_says_nothing_of_the_ankle(leg, model, shape, simulated_reference):
+    """What was known before stays, mean and deviation; effects by way of other joints are not used."""
+    hip, own, every = angle_model(leg, ("B",)), [*range(7), 9], simulated_reference
+    its = attrs.evolve(every, deviation=every.deviation[:, :1], columns=every.columns[:, :1, own])
+    errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
 
     def by_hip(sigma_m):
-        hidden = ClearanceRegression(model, simulated_reference, prior_with(UNKNOWN, FRESH, sigma_m))
+        hidden = ClearanceRegression(hip, its, prior_with(errors, FRESH, sigma_m))
         for seed in range(30):
             crank, angles = read_cycle(model, shape, WORN, seed=seed)
-            angles[:, 1:] = np.nan
-            hidden.add(crank, angles)
+            hidden.add(*binned(hip, crank, angles[:, :1]))
         return hidden.fused()
 
     expected = [ClearanceObservation.SEEN] * 3 + [ClearanceObservation.NOT_OBSERVABLE] * 2
@@ -391,30 +399,10 @@ def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
             turned.append(run.q[:, 2].copy())
         angle = np.array(turned)
         seen = np.stack([angle[:, j] - angle[:, b] for b, j in pairs], axis=1)
-        hidden.add(angle[:, 1], seen + 1e-4 * random.standard_normal(seen.shape))
+        hidden.add(*binned(model, angle[:, 1], seen + 1e-4 * random.standard_normal(seen.shape)))
     found = hidden.fused()
     assert others(found) == [setup.clearance_joints.index("G")]
     np.testing.assert_allclose(found.clearance_m, [3e-4, 3e-4, 4.5e-4, 3e-4, 3e-4], atol=5e-5)
-
-
-def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, simulated, shape):
-    """What I and J do to the hip by way of others shows in a simulated reference; it is not to be used."""
-    hip, own = angle_model(leg, ("B",)), [*range(7), 9]
-    simulated_reference = attrs.evolve(
-        simulated, deviation=simulated.deviation[:, :1], columns=simulated.columns[:, :1, own]
-    )
-    errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
-    alone = ClearanceRegression(hip, simulated_reference, prior_with(errors, FRESH, 1e-3))
-    absent = ClearanceRegression(model, simulated, prior_with(UNKNOWN, FRESH, 1e-3))
-    for seed in range(30):
-        crank, angles = read_cycle(model, shape, WORN, seed=seed, noise=1e-4)
-        alone.add(crank, angles[:, :1])
-        angles[:, 1:] = np.nan
-        absent.add(crank, angles)
-    found, expected = absent.fused(), alone.fused()
-    assert observations(found)[3:] == observations(expected)[3:] == [ClearanceObservation.NOT_OBSERVABLE] * 2
-    np.testing.assert_allclose(found.mean[own], expected.mean, rtol=1e-3, atol=1e-7)
-    np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-2)
 
 
 def test_a_worn_joint_is_worn_more_where_it_is_worn():

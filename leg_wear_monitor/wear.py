@@ -185,13 +185,6 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
         i, j = _beside(i, 1, n), after
 
 
-def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
-    """Worn volume (k, 2) [m^3] of bushing and journal."""
-    sector = TURN / surfaces.depth.shape[2]
-    area = contacts.bushing_radius * contacts.width * sector
-    return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
-
-
 def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | None:
     """Narrowest zone of the surface that contains a fraction of the wear.
 

@@ -11,8 +11,6 @@ from live_browser import LivePage
 from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S
 from leg_wear_monitor.state import State
 
-pytestmark = NEEDS_CHROMIUM
-
 IS_OLD = "document.documentElement.hasAttribute('data-old')"
 IS_FRESH = f"document.querySelector('.freshness') && !{IS_OLD}"
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
@@ -33,6 +31,7 @@ def page(request, dashboard, tmp_path):
     page.close()
 
 
+@NEEDS_CHROMIUM
 @pytest.mark.parametrize("page", WIDTHS, indirect=True)
 def test_it_is_renewed_says_when_it_is_old_or_alone_and_runs_no_markup(page, dashboard, leg, clock):
     assert page.text("[data-region=verdict] .verdict").split() == ["✓", "HEALTHY"]
@@ -61,6 +60,7 @@ def test_it_is_renewed_says_when_it_is_old_or_alone_and_runs_no_markup(page, das
     assert page.text(".freshness").startswith("NO CONNECTION to the dashboard for ")
 
 
+@NEEDS_CHROMIUM
 def test_what_is_wrong_would_be_seen(tmp_path):
     page = LivePage("data:text/html,<script>nothing()</script><p>shown", tmp_path)
     try:
@@ -68,3 +68,24 @@ def test_what_is_wrong_would_be_seen(tmp_path):
         assert any("nothing is not defined" in line for line in page.console)
     finally:
         page.close()
+
+
+@pytest.mark.parametrize(
+    ("request_", "code"),
+    [
+        ({}, 200),
+        ({"Host": "evil.example"}, 403),  # a page elsewhere whose name was made to lead here
+        ({"Sec_Fetch_Site": "cross-site"}, 403),
+        ({"method": "POST", "body": b"x"}, 405),
+        ({"path": "/nowhere/<b>"}, 404),
+    ],
+)
+def test_who_reads_it_uses_its_name_and_no_page_elsewhere_does(dashboard, request_, code):
+    status, headers, text = dashboard.ask(**request_)
+    assert status == code
+    if code == 200:
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
+    else:
+        assert text.startswith(f"{code} ") and "<" not in text
+    with dashboard.events() as events:
+        assert next(events)

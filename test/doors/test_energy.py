@@ -5,8 +5,6 @@ import pytest
 
 import leg_wear_monitor as lw
 
-PUSH = {"body": "foot", "point": "toe", "force": [0.0, 290.0]}
-
 # Friction coefficient, force on the ground [N], clearance [m], bound of the residual over the losses in ten
 # cycles: some three times what docs/appendix/validation_clearance.md lists, because the cycles of a run
 # scatter. Mean and sigma: 1.1e-3, 2e-5; 6.7e-3, 2.1e-3; 0, 7e-5 (10 moved starts, 2026-11-23).

@@ -24,7 +24,7 @@ pytest.importorskip("mcap")
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from mcap.reader import make_reader
+from raw_messages import messages_of
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -332,14 +332,6 @@ def test_sigterm_ends_both_nodes_in_order(scene: Scene) -> None:
     for side in ("left", "right"):
         log = (scene.home / f"{side}.log").read_text()
         assert "The monitor advises." in log and "Traceback" not in log
-
-
-def messages_of(path: Path) -> dict[str, list[bytes]]:
-    found: dict[str, list[bytes]] = defaultdict(list)
-    with path.open("rb") as file:
-        for _, channel, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False):
-            found[channel.topic].append(message.data)
-    return found
 
 
 def test_a_replay_of_the_recording_gives_the_live_reports_byte_for_byte(

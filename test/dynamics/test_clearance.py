@@ -24,7 +24,6 @@ from leg_wear_monitor.dynamics.clearance.tables import (
 )
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.run import (
-    ARCHARD,
     DONE,
     FORCE,
     INVALID_DRIVE,
@@ -39,7 +38,6 @@ from leg_wear_monitor.mechanism.constraints import applied_forces_at, external_p
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.mechanism.position import TURN, Linkage, evaluate, ideal_motion
 from leg_wear_monitor.mechanism.spec import ConstantLoad, Track, TrackDrive
-from leg_wear_monitor.wear import Surfaces, worn_volume
 
 # Tables of the clearance model against the linkage itself: its closures, its reactions, its inertia.
 
@@ -482,18 +480,6 @@ def test_at_rest_the_contacts_carry_the_weight(leg, tables):
     np.testing.assert_allclose(statistics.integral[:, FORCE] / statistics.time[0], wanted, rtol=0.01)
 
 
-@settings(max_examples=10)
-@given(t=st.floats(0.01, 1.0))
-def test_no_wear_is_lost(new_stepper, t):
-    """Depth x arc x width over all sectors, with what is pending, is k times the Archard integral."""
-    stepper, statistics = new_stepper(), new_run_statistics(10)
-    drive(stepper, [Piece(steady_drive(0.0, TURN), t)], statistics)
-    contacts, pending = stepper.model.contacts, stepper.state.pending[0, :, None]
-    volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
-    wanted = contacts.wear_coefficient * statistics.integral[contacts.joint, ARCHARD][:, None]
-    np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
-
-
 # A crank behind a coupling: energy, the rigid limit, full coordinates.
 
 
@@ -585,9 +571,6 @@ def test_the_torque_of_a_coupling_is_that_of_full_coordinates(leg, stiffness):
 
 
 # Many legs in one call: each as if it were alone, whatever the others and however many threads.
-
-
-SHORT_SPAN = {"cycles": 0.2, "skip_cycles": 0.1}
 
 
 def with_joint(leg, name, **changes):

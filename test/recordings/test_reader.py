@@ -4,11 +4,9 @@ import os
 import shutil
 import sqlite3
 import struct
-from collections.abc import Callable
 from contextlib import closing
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
 
 import attrs
 import lz4.frame
@@ -31,9 +29,6 @@ from leg_wear_monitor.twin.sample import NO_FAULT
 
 
 # However messages were stored, the same samples come out, in order of log time.
-
-
-Read = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
@@ -468,7 +463,6 @@ def test_names_in_a_file_obey_nobody(tmp_path, read):
 # The same values as CSV, as Parquet, as arrays and as MCAP give the same samples, bit for bit.
 
 
-ReadRecording = Callable[..., Any]
 NS = {"table.units.stamp": "ns", "table.columns.crank_speed": "crank_speed"}
 NAMES = ("time", "crank_angle", "crank_speed", "drive_torque")
 FIELDS = ("stamp_ns", "crank_angle_rad", "crank_velocity_radps", "torque_nm")

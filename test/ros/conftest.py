@@ -220,14 +220,6 @@ def stage(domain: int) -> Iterator[Stage]:
     stage.close()
 
 
-@pytest.fixture(scope="module")
-def shared_stage() -> Iterator[Stage]:
-    """A stage for all tests of a module."""
-    stage = Stage(next(_domains))
-    yield stage
-    stage.close()
-
-
 @pytest.fixture(scope="session", autouse=True)
 def take_soon() -> Iterator[None]:
     """A node in this process takes its messages each 5 ms: a walk is sent no faster than it is taken."""

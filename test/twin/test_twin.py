@@ -628,7 +628,7 @@ def test_gait_cycles_that_cannot_be_compared_say_why(leg, twin):
     assert rest.count(NotCompared.CADENCE) == 2  # the cycle of the change, and the one after it
     assert rest.count(NotCompared.GAP) == 1
     assert rest.count(None) == len(rest) - 3
-    without = samples.copy()
+    without = samples[:700].copy()
     without["torque_nm"] = np.nan
     cycles = DigitalTwin(leg).update(without).cycles
     assert {cycle.not_compared for cycle in cycles} == {NotCompared.SAMPLES}

@@ -29,8 +29,10 @@ from leg_wear_monitor.report.figure import (
     SKY,
     SMALL,
     VERMILION,
+    draw_leg,
     draw_life,
     finish,
+    leg_picture,
     length_unit,
     new_figure,
     opened,
@@ -39,7 +41,6 @@ from leg_wear_monitor.report.figure import (
     time_of,
     use_own_style,
 )
-from leg_wear_monitor.report.leg_picture import draw_leg, leg_picture
 from leg_wear_monitor.state import Figure
 from leg_wear_monitor.wear import BUSHING, JOURNAL
 

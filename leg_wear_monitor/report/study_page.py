@@ -19,11 +19,11 @@ from leg_wear_monitor.report.figure import (
     SKY,
     SMALL,
     finish,
+    leg_picture,
     new_figure,
     png,
     use_own_style,
 )
-from leg_wear_monitor.report.leg_picture import leg_picture
 from leg_wear_monitor.report.page import Gallery, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.studies.paper import CLAIMS, STANDARD_ERRORS, Responses, responses_of
 from leg_wear_monitor.studies.run import StudyResults

@@ -35,10 +35,11 @@ from leg_wear_monitor.report.page import (
     verdict_banner,
 )
 from leg_wear_monitor.report.replay.charts import (
+    forecast_section,
     health_chart,
     joint_section,
+    wear_section,
 )
-from leg_wear_monitor.report.replay.forecast_section import forecast_section, wear_section
 from leg_wear_monitor.report.replay.joints import joints_and_leg
 from leg_wear_monitor.state import AlarmChange, Figure, JointClearance, LegAlarm, Level
 

@@ -1,7 +1,5 @@
 """The page of a replay, from its summary: the answer on the first screen, and the rest folded below."""
 
-import math
-
 import attrs
 
 from leg_wear_monitor.files import or_nan, share_directory
@@ -12,7 +10,6 @@ from leg_wear_monitor.monitor.verdict.verdict import figures_of, guide_to, how_s
 from leg_wear_monitor.recordings.result import (
     ReplayGait,
     ReplayRecording,
-    ReplayStatus,
     ReplaySummary,
 )
 from leg_wear_monitor.report.guide import enclosed
@@ -203,131 +200,65 @@ def certainty_section(summary: ReplaySummary) -> Section:
     return Section("How sure is the verdict?", [table if rows else unknown], is_folded=True)
 
 
-# Validity of the page's values: input, torque, cadence and model, each in a card.
+# Validity of the page's values: input, torque, cadence, foot load and model, each in a card.
 
 
 _ANSWERS = {Level.OK: "yes", Level.WARN: "in part", Level.ERROR: "no"}
-_LEAST_REST = 0.01  # fraction of the torque, as in the verdict of a healthy leg
-
-_Card = tuple[str, Level, list[str]]
-"""One question: its name, whether the answer is fine, and why."""
+_OF_STATUS = {"input": "Input", "torque": "Torque", "gait": "Cadence", "foot_load": "Foot load"}
 
 
 def belief(summary: ReplaySummary) -> str:
-    """Markup of the cards."""
-    found = [_input(summary), _torque(summary), _cadence(summary), *_foot_load(summary), _model(summary)]
+    """Markup of the cards: the statuses of these names, and what the verdict says of the model."""
+    found = [
+        (_OF_STATUS[status.name], status.level, [status.message])
+        for status in summary.status
+        if status.name in _OF_STATUS
+    ]
     cards = [
         {
             "name": name,
             "look": LEVEL_LOOKS[level],
             "answer": _ANSWERS[level],
-            "sentences": [f"{part[:1].upper()}{part[1:]}." for part in why if part],
+            "sentences": [f"{part[:1].upper()}{part[1:]}." for part in why],
         }
-        for name, level, why in found
+        for name, level, why in [*found, _model(summary)]
     ]
     return render("replay/belief.html", cards=cards)
 
 
-def _status(summary: ReplaySummary, name: str) -> ReplayStatus | None:
-    return next((status for status in summary.status if status.name == name), None)
-
-
-def _input(summary: ReplaySummary) -> _Card:
-    status, level, why = _status(summary, "input"), Level.OK, []
-    if status:
-        level = status.level
-        why.append(status.message)
-    if summary.recording.is_partial:
-        level = max(level, Level.WARN)
-        why.append("the recording is damaged or incomplete: only its readable part is used")
-    if summary.lost.unmonitored_s > 1.0:
-        level = max(level, Level.WARN)
-        why.append(f"{duration(summary.lost.unmonitored_s)} were not monitored")
-    return "Input", level, why
-
-
-def _torque(summary: ReplaySummary) -> _Card:
-    status = _status(summary, "torque")
-    if status is None:
-        return "Torque", Level.ERROR, [summary.diagnosis.reason or "unknown"]
-    is_compared = status.values.get("mismatch") is not None
-    return "Torque", status.level if is_compared else Level.ERROR, [status.message]
-
-
-def _cadence(summary: ReplaySummary) -> _Card:
-    status, commanded = _status(summary, "gait"), summary.monitor.commanded_rpm
-    cadence = status.values.get("cadence_rpm") if status else None
-    if status is None or cadence is None:
-        return "Cadence", Level.ERROR, ["unknown"]
-    is_other = summary.verdict.fault_code == "CADENCE"
-    level = max(status.level, Level.WARN if is_other else Level.OK)
-    why = [f"{cadence:.3g} rpm, commanded {commanded:.3g} rpm"]
-    if not summary.gait.believable_cycles:
-        level = Level.ERROR
-        why.append(summary.gait.missing)
-    return "Cadence", level, why
-
-
-def _foot_load(summary: ReplaySummary) -> list[_Card]:
-    """The load on the foot; nothing if no load is known."""
-    load = summary.load
-    if load.peak_n is None:
-        return []
-    source = "measured" if load.source == "measured" else "estimated from the drive torque"
-    sigma = f" ± {load.peak_sigma_n:.0f}" if load.peak_sigma_n is not None else ""
-    return [("Foot load", Level.OK, [f"{source}: {load.peak_n:.0f}{sigma} N at its peak"])]
-
-
-def _model(summary: ReplaySummary) -> _Card:
-    invalid, gait = summary.verdict.not_valid, summary.gait
+def _model(summary: ReplaySummary) -> tuple[str, Level, list[str]]:
+    """The model's card: its name, whether its values are valid, and why."""
+    invalid, gait, factor = summary.verdict.not_valid, summary.gait, summary.monitor.wear_acceleration
     if not gait.believable_cycles and not gait.is_counted:
         return "Model", Level.ERROR, [f"no gait cycle fits this leg: {gait.missing}"]
-    level, why = Level.OK, [_explained(summary)]
+    doubts = []
     if invalid:
-        level = Level.ERROR if Figure.CLEARANCES in invalid else Level.WARN
-        why = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
-    elif not why[0]:
-        level, why = Level.WARN, ["no measurement checks it"]
-    elif _unexplained(summary) > summary.monitor.limits.torque_mismatch:
-        level = Level.WARN
+        doubts = [reason(summary.verdict), "not valid: " + ", ".join(each.words for each in invalid)]
     if gait.doubtful_cycles:
-        level = max(level, Level.WARN)
-        why.append(f"{gait.doubtful_cycles} gait cycles do not fit this leg")
-    if summary.monitor.wear_acceleration != 1.0:
-        level = max(level, Level.WARN)
-        factor = summary.monitor.wear_acceleration
-        why.append(f"all wear is multiplied by {factor:g}: a demonstration, not a measurement")
-    return "Model", level, why
+        doubts.append(f"{gait.doubtful_cycles} gait cycles do not fit this leg")
+    if factor != 1.0:
+        doubts.append(f"all wear is multiplied by {factor:g}: a demonstration, not a measurement")
+    level = Level.ERROR if Figure.CLEARANCES in invalid else Level.WARN if doubts else Level.OK
+    return "Model", level, doubts or ["the gait cycles fit this leg"]
 
 
-def _explained(summary: ReplaySummary) -> str:
-    """The part of the drive torque that the model explains; empty if this is not known."""
-    mismatch = _unexplained(summary)
-    if math.isnan(mismatch):
-        return ""
-    limit = 100.0 * summary.monitor.limits.torque_mismatch
-    rest = f"{100.0 * mismatch:.2g}" if mismatch >= _LEAST_REST else "less than 1"
-    return f"{rest} % of the drive torque is not explained (limit {limit:.3g} %)"
-
-
-def _unexplained(summary: ReplaySummary) -> float:
-    """Part of the drive torque that the model does not explain; NaN if that is not known."""
-    torque = _status(summary, "torque")
-    return or_nan(torque.values.get("mismatch")) if torque else math.nan
-
-
-def _entered(summary: ReplaySummary) -> list[Part]:
-    """Note that the verdict is later than the recording; nothing if it is not."""
-    if is_of_recording(summary):
-        return []
-    words = "The verdict uses ledger entries or measurements that are newer than this recording"
-    return [Text(f"{words}; input, torque, cadence, growth and forces are from the recording.")]
+def _notes(summary: ReplaySummary) -> list[Part]:
+    """Notes that the verdict is later than the recording, and that this is damaged; nothing if neither is."""
+    notes = []
+    if not is_of_recording(summary):
+        notes.append(
+            "The verdict uses ledger entries or measurements that are newer than this recording; input, "
+            "torque, cadence, growth and forces are from the recording."
+        )
+    if summary.recording.is_partial:
+        notes.append("The recording is damaged or incomplete: only its readable part is used.")
+    return [Text(note) for note in notes]
 
 
 def replay_page(summary: ReplaySummary) -> Page:
     """The page of a replay."""
     recording, monitor = summary.recording, summary.monitor
-    valid = [*_entered(summary), Fragment(belief(summary))]
+    valid = [*_notes(summary), Fragment(belief(summary))]
     sections = [_joints(summary), Section("Are these values valid?", valid)]
     raised = raised_alarms(summary, otherwise="No alarm is raised at the end.")
     sections += [Section("Alarms", [Fragment(raised)])]

@@ -25,7 +25,7 @@ from full_against_clearance import (
 )
 
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
-from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
+from leg_wear_monitor.mechanism.spec import Load
 
 LEG = load_mechanism("bionic_leg")
 RPM = 60.0
@@ -36,7 +36,7 @@ DIGITS = (2, 2, 0, 3, 4)  # of FIGURES
 
 def pushed(force_n: float) -> Mechanism:
     """The leg with a constant force up at its toe."""
-    return attrs.evolve(LEG, loads={"ground": ConstantLoad(body="foot", point="toe", force=(0.0, force_n))})
+    return attrs.evolve(LEG, loads={"ground": Load(body="foot", point="toe", force=((0.0, force_n),))})
 
 
 def walking(force_n: float) -> Mechanism:
@@ -44,7 +44,7 @@ def walking(force_n: float) -> Mechanism:
     phase = np.arange(PHASES) / PHASES
     push = force_n * np.clip(np.cos(2.0 * np.pi * (phase - STANCE)), 0.0, None)
     force = tuple((0.2 * float(up), float(up)) for up in push)
-    load = PhaseLoad(body="foot", point="toe", phase=tuple(phase.tolist()), force=force)
+    load = Load(body="foot", point="toe", phase=tuple(phase.tolist()), force=force)
     return attrs.evolve(LEG, loads={"ground": load})
 
 

@@ -10,7 +10,7 @@ from leg_wear_monitor.compiled.vectors import LEAST_DIVISOR, largest, root, wher
 from leg_wear_monitor.configuration import Doubt
 from leg_wear_monitor.contact.laws import LAWS
 from leg_wear_monitor.mechanism.position import Linkage, one_cycle
-from leg_wear_monitor.mechanism.spec import Clearance, SpeedDrive, TrackDrive
+from leg_wear_monitor.mechanism.spec import Clearance, TorqueDrive
 
 # Bound of the gradient across the eccentricity due to the bend (`worn_contact`), compared with the wall's
 # unit normal, which has length 1.
@@ -133,10 +133,9 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
 def conformity_doubts(linkage: Linkage) -> Iterator[Doubt]:
     """Clearance joints with a law that is not valid at the ideal motion's 99th percentile of the force."""
     mechanism, drive = linkage.mechanism, linkage.mechanism.drive
-    if not mechanism.clearance_joints or not isinstance(drive, SpeedDrive | TrackDrive):
+    if not mechanism.clearance_joints or isinstance(drive, TorqueDrive):
         return
-    speed = drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
-    force = np.linalg.norm(one_cycle(linkage, _POINTS, speed).joint_force, axis=2)
+    force = np.linalg.norm(one_cycle(linkage, _POINTS, drive.speed).joint_force, axis=2)
     p99 = dict(zip(mechanism.joints, np.quantile(force, 0.99, axis=0).tolist(), strict=True))
     for joint in mechanism.clearance_joints:
         settings = mechanism.clearances[joint]

@@ -19,7 +19,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     INTERVALS,
     ClearanceRun,
     ClearanceStepper,
-    needs_speed,
+    check_is_for_clearances,
 )
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.result import JointResult, SimulationResult, ToeResult, TorqueResult, Trace
@@ -211,8 +211,9 @@ _MOST_PATH, _ROUNDING = 1.1, 1.0e-9
 
 
 def default_model(mechanism: Mechanism) -> str:
-    """Default formulation: ``full`` for a mechanism driven by torque or controller, else ``clearance``."""
-    return "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
+    """Default formulation: ``full`` for a drive by torque or controller, or for dampers."""
+    is_damped = any(spring.damping > 0.0 for spring in mechanism.springs.values())
+    return "clearance" if isinstance(mechanism.drive, SpeedDrive) and not is_damped else "full"
 
 
 def prepare(
@@ -297,7 +298,8 @@ def simulate(
     skip_cycles : float, optional
         Gait cycles simulated before counting starts; default: 1, or 0 with ``duration_s``.
     model : str, optional
-        A key of `MODELS`; default: ``full`` for a drive by torque or controller, else ``clearance``.
+        A key of `MODELS`; default: ``full`` for a drive by torque or controller, or for springs with a
+        damper, else ``clearance``.
     wear : bool
         True if wear widens the clearances during the run; it is counted in any case.
     normal_law : str, optional
@@ -407,7 +409,7 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
             raise ConfigError("speed-rpm", "", f"{speed_rpm:g} rpm: {mechanism.source} is driven by a torque")
         return drive.initial_speed
     if speed_rpm is None:
-        return drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
+        return drive.speed
     if not (math.isfinite(speed_rpm) and abs(speed_rpm) >= LEAST_RPM):
         expected = f"Expected at least {LEAST_RPM:g} rpm in either direction"
         raise ConfigError("speed-rpm", "", f"{speed_rpm} rpm does not turn the crank. {expected}")
@@ -568,8 +570,7 @@ class Leg:
             wear=self.wear,
             normal_law=self.normal_law,
         )
-        if not isinstance(self.mechanism.drive, SpeedDrive):
-            raise needs_speed(self.mechanism)
+        check_is_for_clearances(self.mechanism)
         smallest = setup.contacts.clearance.min(initial=math.inf)
         if not 0.0 <= self.perturb_m <= smallest:
             raise ConfigError(

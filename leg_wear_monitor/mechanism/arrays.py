@@ -148,13 +148,10 @@ def _springs(mechanism: spec.Mechanism, index: dict[str, int]) -> dict[str, np.n
 def _loads(mechanism: spec.Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
     """Arrays of the loads: tables over the phase, closed periodically, padded with their last entry."""
     loads = list(mechanism.loads.values())
-    length = 2 + max(
-        (len(load.phase) if isinstance(load, spec.PhaseLoad) else 1 for load in loads), default=0
-    )
+    length = 2 + max((len(load.phase) for load in loads), default=0)
     phases, forces = np.zeros((len(loads), length)), np.zeros((len(loads), length, 2))
     for i, load in enumerate(loads):
-        phase = np.array(load.phase if isinstance(load, spec.PhaseLoad) else [0.0])
-        force = np.array(load.force if isinstance(load, spec.PhaseLoad) else [load.force])
+        phase, force = np.array(load.phase), np.array(load.force)
         phases[i] = phase[0] + 1.0
         phases[i, : len(phase) + 1] = phase[-1] - 1.0, *phase
         forces[i] = force[0]

@@ -25,7 +25,6 @@ from leg_wear_monitor.mechanism.spec import (
     Pair,
     PrismaticJoint,
     RevoluteJoint,
-    SpeedDrive,
     TorqueDrive,
 )
 
@@ -101,9 +100,8 @@ def _speed(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     if isinstance(drive, spec.TorqueDrive):
         yield from unusual(drive, "drive.")
         return
-    key, speed = "drive.speed", drive.speed if isinstance(drive, spec.SpeedDrive) else drive.track.speed_radps
-    if not isinstance(drive, spec.SpeedDrive):
-        key = "drive.track.speed_radps"
+    key = "drive.speed" if isinstance(drive, spec.SpeedDrive) else "drive.track.speed_radps"
+    speed = drive.speed
     rpm = 60.0 * speed / TURN
     # a speed that was converted is a whole number of rpm; one that is a whole number of rad/s may be rpm
     if _beyond(speed, 0.0, 20.0) and speed == round(speed) and abs(rpm - round(rpm)) > _ROUND:
@@ -179,8 +177,7 @@ def ratio_fault(clearance_m: float, radius_m: float) -> str | None:
 
 def _loads(mechanism: spec.Mechanism) -> Iterator[Doubt]:
     for name, load in mechanism.loads.items():
-        forces = load.force if isinstance(load, spec.PhaseLoad) else (load.force,)
-        force = max((math.hypot(*each) for each in forces), default=0.0)
+        force = max(math.hypot(*each) for each in load.force)
         if force > 1.0e5:
             yield Doubt(f"loads.{name}.force", f"{force:g} N, usually below 1e5 N. Is it in mN?")
 
@@ -338,9 +335,8 @@ def _drive(mechanism: Mechanism) -> str:
     drive = mechanism.drive
     if isinstance(drive, TorqueDrive):
         return f"crank driven by {drive.torque:.4g} N m"
-    speed = drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
-    sense = "counter-clockwise" if speed > 0.0 else "clockwise"
-    return f"crank {60.0 * abs(speed) / TURN:.4g} rpm {sense}"
+    sense = "counter-clockwise" if drive.speed > 0.0 else "clockwise"
+    return f"crank {60.0 * abs(drive.speed) / TURN:.4g} rpm {sense}"
 
 
 def _clearances(mechanism: Mechanism) -> Iterator[str]:
@@ -557,10 +553,6 @@ def _joint_class(entry: Any) -> tuple[type, Any]:
     raise FieldError("kind", f"{shown(kind)} is not one of revolute, prismatic")
 
 
-def _load_class(entry: Any) -> tuple[type, Any]:
-    return spec.PhaseLoad if "phase" in mapping(entry) else spec.ConstantLoad, entry
-
-
 _DRIVES = {"speed": spec.SpeedDrive, "torque": spec.TorqueDrive, "track": spec.TrackDrive}
 
 
@@ -579,6 +571,11 @@ def _torques(entry: Any) -> tuple[Any, Any]:
     return tuple[float, ...], entry if isinstance(entry, list) else [entry]
 
 
+def _forces(entry: Any) -> tuple[Any, Any]:
+    is_one = isinstance(entry, list) and not any(isinstance(each, list) for each in entry)
+    return tuple[spec.Vector, ...], [entry] if is_one else entry
+
+
 def _label(entry: Any) -> tuple[Any, Any]:
     if entry is None or entry == "":
         raise FieldError("", "is empty. Expected a name such as knee, or no label")
@@ -586,7 +583,7 @@ def _label(entry: Any) -> tuple[Any, Any]:
 
 
 choose(spec.RevoluteJoint | spec.PrismaticJoint, _joint_class)
-choose(spec.ConstantLoad | spec.PhaseLoad, _load_class)
+choose(spec.Forces, _forces)
 choose(spec.Drive, _drive_class)
 choose(spec.Torques, _torques)
 choose(spec.Label, _label)

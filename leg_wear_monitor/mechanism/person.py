@@ -14,7 +14,7 @@ from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.files import number_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage, one_cycle, point_motion
-from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, PhaseLoad, TrackDrive, Vector
+from leg_wear_monitor.mechanism.spec import GROUND, Body, Load, Mechanism, Vector
 
 # A person's leg that hangs on a linkage: segments added to its thigh, shank and foot (physics.md section 9).
 #
@@ -194,9 +194,7 @@ def nominal_stance(linkage: Linkage) -> Stance:
     end, begin = int(forth[0]), int(forth[-1]) - _POINTS
     middle, half = lowest + 0.5 * (begin + end), 0.5 * _STANCE * (end - begin)
     ends = [float(at / _POINTS % 1.0) for at in (middle - half, middle + half)]
-    drive = mechanism.drive
-    speed = drive.track.speed_radps if isinstance(drive, TrackDrive) else getattr(drive, "speed", 1.0)
-    turned = float(np.sign(speed) or 1.0)
+    turned = float(np.sign(getattr(mechanism.drive, "speed", 1.0)) or 1.0)
     heel_strike, toe_off = ends if turned > 0.0 else reversed(ends)
     return Stance(heel_strike, toe_off, turned, up, turned * back * across)
 
@@ -276,9 +274,7 @@ def with_toe_force(mechanism: Mechanism, force: Floats, name: str = GROUND_LOAD)
         raise ConfigError(mechanism.source, "bodies", "has no point called toe for the ground to push")
     body, point = mechanism.toe
     phases = tuple((np.arange(len(force)) / len(force)).tolist())
-    load = PhaseLoad(
-        body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
-    )
+    load = Load(body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force))
     return attrs.evolve(mechanism, loads={**mechanism.loads, name: load})
 
 

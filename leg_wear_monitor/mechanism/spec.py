@@ -123,6 +123,7 @@ Vector = tuple[float, float]
 _TORQUE_SLIP = f"{USUAL}; N mm for N m?"
 Pose = tuple[float, float, float]
 Torques = Annotated[tuple[float, ...], "one per phase"]  # in a file, one number is a constant torque
+Forces = Annotated[tuple[Vector, ...], "one per phase"]  # in a file, one force is a constant one
 Label = Annotated[str, "in a file, not empty"]
 
 GROUND = "ground"
@@ -267,6 +268,11 @@ class TrackDrive:
     body: str = described("the crank")
     track: Track = described("the controller, a mapping of the keys below")
 
+    @property
+    def speed(self) -> float:
+        """Speed to follow [rad/s]."""
+        return self.track.speed_radps
+
 
 Drive = SpeedDrive | TorqueDrive | TrackDrive
 
@@ -279,28 +285,23 @@ class Spring:
     points: tuple[str, str] = described("its point on each body")
     stiffness: float = quantity("N/m", "stiffness", at_least=0.0)
     free_length: float = quantity("m", "length without force", at_least=0.0)
-    damping: float = quantity("N s/m", "viscous damping", at_least=0.0, default=0.0)
+    damping: float = quantity("N s/m", "viscous damping, in full coordinates only", at_least=0.0, default=0.0)
 
 
 @attrs.frozen(kw_only=True)
-class ConstantLoad:
-    """A constant force on a point of a body."""
+class Load:
+    """A force on a point of a body: constant, or a periodic table, linear between its entries."""
 
     body: str = described("body that the force acts on")
     point: str = described("its point")
-    force: Vector = quantity("N", "force in the ground's frame, [x, y]")
-
-
-@attrs.frozen(kw_only=True)
-class PhaseLoad:
-    """A force on a point of a body as a table over the gait phase, linear between its entries, periodic."""
-
-    body: str = described("body that the force acts on")
-    point: str = described("its point")
+    force: Forces = quantity("N", "force in the ground's frame, [x, y]; one, or one per phase")
     phase: tuple[float, ...] = quantity(
-        "", "fractions of the gait cycle, 0 at crank angle 0", at_least=0.0, check=_rises_below_one
+        "",
+        "fractions of the gait cycle, 0 at crank angle 0",
+        at_least=0.0,
+        default=(0.0,),
+        check=_rises_below_one,
     )
-    force: tuple[Vector, ...] = quantity("N", "a force [x, y] for each of them, in the ground's frame")
 
     def __attrs_post_init__(self) -> None:
         if len(self.force) != len(self.phase):
@@ -347,7 +348,7 @@ class Mechanism:
     drive: Drive = described("drive of the crank")
     assembly: Assembly = described("initial guess: crank angle and each body's pose")
     springs: dict[str, Spring] = described("springs by name", factory=dict)
-    loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
+    loads: dict[str, Load] = described("forces on points by name", factory=dict)
     clearances: dict[str, Clearance] = described("the joints with clearance and their settings", factory=dict)
     clearance_joints: tuple[str, ...] = ()
     toe_point: tuple[str, str] | None = None

@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import understood
 from leg_wear_monitor.mechanism.position import carriers, corners, is_on_ground, rotated
 from leg_wear_monitor.mechanism.reach import Reach, findings, headline
-from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, SpeedDrive, TorqueDrive
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint, TorqueDrive
 from leg_wear_monitor.report.figure import BODY_COLOURS
 from leg_wear_monitor.report.page import (
     Fragment,
@@ -31,11 +31,7 @@ def first_position(reach: Reach) -> int:
     if not reach.rocks:
         return 0
     drive = reach.mechanism.drive
-    forwards = (
-        drive.torque
-        if isinstance(drive, TorqueDrive)
-        else (drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps)
-    )
+    forwards = drive.torque if isinstance(drive, TorqueDrive) else drive.speed
     return len(reach.q) - 1 if forwards >= 0.0 else 0
 
 

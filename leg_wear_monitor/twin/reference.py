@@ -19,7 +19,7 @@ from leg_wear_monitor.dynamics.clearance.stepper import (
     put_force,
 )
 from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables, is_damped
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.run import DONE, TORQUE, CrankMotion, Setup, new_run_statistics, quintic
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -428,10 +428,8 @@ def drive_coupling(setup: Setup, model: ClearanceModel, parameters: LegParameter
     """Coupling of a leg whose drive has a compliance."""
     if parameters.compliance == 0.0:
         return rigid_coupling()
-    joints, damped = len(setup.clearance_joints), is_damped(setup.linkage.arrays)
-    return coupling_of(
-        model.tables, joints, damped, model.interval, 1.0 / parameters.compliance, parameters.damping
-    )
+    joints, stiffness = len(setup.clearance_joints), 1.0 / parameters.compliance
+    return coupling_of(model.tables, joints, model.interval, stiffness, parameters.damping)
 
 
 def even_angles(profile: CrankProfile) -> Floats:

@@ -86,6 +86,10 @@ def test_a_torque_from_rest_does_work_on_springs_a_damper_and_a_load(tmp_path) -
     turned = energy.work_in
     assert turned > 1.0
     assert abs(energy.residual) < 1.0e-4 * turned
+    (tmp_path / "steady.yaml").write_text(text.replace("torque: 2.0", "speed: 6.0"))
+    assert lw.simulate(tmp_path / "steady.yaml", cycles=0.25, skip_cycles=0).model == "full"
+    with pytest.raises(lw.ConfigError, match=r"springs.back.damping: the clearance model has no dampers"):
+        lw.simulate(tmp_path / "steady.yaml", model="clearance")
 
 
 @pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg", "klann_leg", "four_bar"])

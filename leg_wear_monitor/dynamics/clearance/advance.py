@@ -124,14 +124,14 @@ def sudden_impulse(now, x, added):
 def reactions(tables, angle, now, x, sample, out_by, out_reaction):
     """Drive torque [N m] and reactions of the ideal joints [N] at a crank angle, in the tables' order.
 
-    ``out_by`` (4 + 3 d + k,) contains the factors of the table's columns; out_reaction has room for vectors.
+    ``out_by`` (3 + 2 d + k,) contains the factors of the table's columns; out_reaction has room for vectors.
     """
     table, speed, d = tables.reaction, now.speed[0], now.torque_a.shape[0]
-    out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed
+    out_by[0], out_by[1], out_by[2] = 1.0, now.speed[1], speed * speed
     for i in range(d):
-        out_by[4 + i], out_by[4 + d + i], out_by[4 + 2 * d + i] = x[A0, i], speed * x[V0, i], x[V0, i]
+        out_by[3 + i], out_by[3 + d + i] = x[A0, i], speed * x[V0, i]
     for k in range(now.lever_drive.shape[0]):
-        out_by[4 + 3 * d + k] = sample[F_T, k]
+        out_by[3 + 2 * d + k] = sample[F_T, k]
     i, w = blend(table.shape[0] - 1, angle)
     for r in range(0, out_reaction.shape[0], WIDTH):
         before, after = every(0.0), every(0.0)
@@ -143,17 +143,12 @@ def reactions(tables, angle, now, x, sample, out_by, out_reaction):
 
 @kernel
 def outside_power(now, x):
-    """Power of loads and of the springs' dampers [W] for the rates in row V0."""
-    d, speed, damper = now.torque_a.shape[0], now.speed[0], now.damper
+    """Power of loads [W] for the rates in row V0."""
+    d, speed = now.torque_a.shape[0], now.speed[0]
     total = every(0.0)
     for i in range(0, d, WIDTH):
         total += part_at(now.load_power, i) * vector_at(x, (V0, i))
-    power = now.load_power[d] * speed + vector_sum(total)
-    for i in range(damper.shape[0]):
-        rate = x[V0, i] if i < d else speed
-        for j in range(d + 1):
-            power -= rate * damper[i, j] * (x[V0, j] if j < d else speed)
-    return power
+    return now.load_power[d] * speed + vector_sum(total)
 
 
 @kernel

@@ -60,7 +60,6 @@ def rigid_coupling() -> Coupling:
 def coupling_of(
     tables: ClearanceTables,
     joints: int,
-    is_damped: bool,
     interval: float,
     stiffness: float,
     damping_ratio: float,
@@ -71,8 +70,6 @@ def coupling_of(
     ----------
     tables : ClearanceTables
     joints : int
-    is_damped : bool
-        True if a spring of the leg has a damper.
     interval : float
         Interval of the stepper [s].
     stiffness : float
@@ -80,7 +77,7 @@ def coupling_of(
     damping_ratio : float
         Damping ratio of the crank on the coupling, with the mean inertia of the ideal leg over a turn.
     """
-    shapes, inertia, whole = motion_shapes(joints, is_damped), np.zeros(len(tables.motion)), 0.0
+    shapes, inertia, whole = motion_shapes(joints), np.zeros(len(tables.motion)), 0.0
     for i, row in enumerate(tables.motion):
         parts = views(row, shapes)
         by_rate, ideal = parts["torque_a"], parts["torque"][1]
@@ -99,7 +96,7 @@ class ClearanceModel(NamedTuple):
 
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
     the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (LAW_ROWS,
-    room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``damped``: 1 with dampers, else 0;
+    room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0;
     ``coupling``: between the drive and the crank; ``parts`` (N,): number of parts of an interval that starts
     at each point of the tables.
     """
@@ -110,7 +107,6 @@ class ClearanceModel(NamedTuple):
     tolerance: Floats
     law: Floats
     usual: int
-    damped: int
     coupling: Coupling
     parts: Ints
 
@@ -181,8 +177,6 @@ class StepTables(NamedTuple):
     turn: Floats
     toe: Floats
     load_power: Floats
-    viscous: Floats
-    damper: Floats
 
 
 class ClearanceWork(NamedTuple):
@@ -246,7 +240,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     """Work arrays for a model and a state."""
     clearance_joints, d = len(state.approach), len(state.e)
     row = np.zeros(model.tables.motion.shape[1])
-    shapes = motion_shapes(clearance_joints, model.damped > 0)
+    shapes = motion_shapes(clearance_joints)
     parts, start = views(row, shapes), start_of("coriolis", shapes)
     drift = np.zeros(padded(d * d))
     now = StepTables(
@@ -318,12 +312,12 @@ def hold_eccentricities(tables, angle, e, v, ahead, now):
     square = speed * speed
     _follow_eccentricities(tables, angle, e, v, ahead, now)
     free, by, by_e, force = now.free, now.torque, now.torque_e, now.force
-    now.torque_0[0] = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
+    now.torque_0[0] = by[0] + acceleration * by[1] + speed * (speed * by[2])
     for i in range(d):
         force[i] = free[0, i] + acceleration * free[1, i] + square * free[2, i]
-        now.torque_by_v[i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
+        now.torque_by_v[i] = speed * now.torque_v[i]
         now.torque_by_e[i] = by_e[0, i] + acceleration * by_e[1, i] + square * by_e[2, i]
-        now.bare[i] = speed * now.viscous[i, d] if now.viscous.shape[0] > 0 else 0.0
+        now.bare[i] = 0.0
     for i in range(0, d, WIDTH):
         bare = part_at(now.bare, i)
         for j in range(d):

@@ -76,10 +76,10 @@ from leg_wear_monitor.dynamics.run import (
 def drift(now, x):
     """Terms that depend on the rates in row V0 of x (VECTORS, room).
 
-    Row DRIFT: acceleration without contact, by gravity, crank, Coriolis terms and dampers [m/s^2]; row BY_V:
+    Row DRIFT: acceleration without contact, by gravity, crank and Coriolis terms [m/s^2]; row BY_V:
     coefficients of e' in the drive torque [N s].
     """
-    viscous, d = now.viscous, now.bare.shape[0]
+    d = now.bare.shape[0]
     for i in range(0, d, WIDTH):
         total, by_v = part_at(now.bare, i), part_at(now.torque_by_v, i)
         for j in range(d):
@@ -87,9 +87,6 @@ def drift(now, x):
             by_v += x[V0, j] * part_at(now.torque_vv, (j, i))
         put_vector(x, (DRIFT, i), total)
         put_vector(x, (BY_V, i), by_v)
-    for i in range(viscous.shape[0]):
-        for j in range(d):
-            x[DRIFT, i] += viscous[i, j] * x[V0, j]
 
 
 @kernel
@@ -376,12 +373,6 @@ def _let_yield(inertia, torque, now, x, v, by_v, along, by_speed):
         now.bare[i] += rest * x[along, i] / inertia
         for k in range(now.moment.shape[0]):
             now.moment[k, i] -= now.lever_drive[k] * by[i] / whole
-    for j in range(min(d, now.viscous.shape[0])):
-        by_rate = 0.0
-        for i in range(d):
-            by_rate += by[i] * now.viscous[i, j]
-        for i in range(d):
-            now.viscous[i, j] += by_rate * x[along, i] / inertia
     return whole, steeper
 
 
@@ -393,11 +384,11 @@ def _follow_speed(whole, now, x, v, by_v, by_speed):
     the start of the part, the masses that turn with the crank would push a light crank away.
     """
     d, by, speed, held = now.bare.shape[0], now.torque_a, now.speed[0], 0.0
-    steeper = 2.0 * speed * now.torque[2] + now.torque[3]
+    steeper = 2.0 * speed * now.torque[2]
     for i in range(d):
         held += by[i] * x[v, i] / whole
-        steeper += now.torque_v[0, i] * x[v, i] + 2.0 * speed * now.torque_e[2, i] * now.middle[i]
-        total = now.viscous[i, d] if now.viscous.shape[0] > 0 else 0.0
+        steeper += now.torque_v[i] * x[v, i] + 2.0 * speed * now.torque_e[2, i] * now.middle[i]
+        total = 0.0
         for j in range(d):
             total += now.coriolis[j, i] * x[v, j] + 2.0 * speed * now.inverse_mass[j, i] * now.free[2, j]
         x[by_speed, i] = total

@@ -36,7 +36,6 @@ from leg_wear_monitor.dynamics.clearance.tables import (
     ClearanceTables,
     build_basis,
     build_tables,
-    is_damped,
     motion_shapes,
     stored_shapes,
     views,
@@ -54,7 +53,7 @@ from leg_wear_monitor.dynamics.run import (
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Flags, Floats, Ints, Singles
 from leg_wear_monitor.mechanism.position import TURN, Linkage, build_linkage
-from leg_wear_monitor.mechanism.spec import ConstantLoad, Mechanism, SpeedDrive, TorqueDrive
+from leg_wear_monitor.mechanism.spec import Load, Mechanism, SpeedDrive, TorqueDrive
 from leg_wear_monitor.wear import BUSHING
 from leg_wear_monitor.workers import compiled_beside
 
@@ -84,7 +83,7 @@ class ClearanceStepper:
     Raises
     ------
     ConfigError
-        For a mechanism driven by a torque: clearance coordinates need a given crank motion.
+        As `check_is_for_clearances`.
     """
 
     def __init__(
@@ -94,9 +93,7 @@ class ClearanceStepper:
         tolerance_m: float = TOLERANCE_M,
         tables: ClearanceTables | None = None,
     ) -> None:
-        mechanism = setup.linkage.mechanism
-        if not isinstance(mechanism.drive, SpeedDrive):
-            raise needs_speed(mechanism)
+        check_is_for_clearances(setup.linkage.mechanism)
         self._setup = setup
         interval = interval_s or length_of(setup, INTERVALS)
         tables = tables or build_tables(setup.linkage, setup.contacts)
@@ -107,7 +104,6 @@ class ClearanceStepper:
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
             usual=int(have_usual_laws(setup.contacts)),
-            damped=int(is_damped(setup.linkage.arrays)),
             coupling=rigid_coupling(),
             parts=np.empty(len(tables.parts), np.int64),
         )
@@ -219,10 +215,21 @@ def _parts(tables: ClearanceTables, length: float) -> Ints:
     return np.clip(np.ceil(length * tables.parts), 1, round(_MOST_PARTS * length)).astype(np.int64)
 
 
-def needs_speed(mechanism: Mechanism) -> ConfigError:
-    """Error for a mechanism that is driven by a constant torque or by a controller."""
-    key = "drive.torque" if isinstance(mechanism.drive, TorqueDrive) else "drive.track"
-    return ConfigError(mechanism.source, key, "the clearance model needs drive.speed; try --model full")
+def check_is_for_clearances(mechanism: Mechanism) -> None:
+    """Check that the crank's motion is given, and that no spring has a damper.
+
+    Raises
+    ------
+    ConfigError
+        If the mechanism is for full coordinates only.
+    """
+    if not isinstance(mechanism.drive, SpeedDrive):
+        key = "drive.torque" if isinstance(mechanism.drive, TorqueDrive) else "drive.track"
+        raise ConfigError(mechanism.source, key, "the clearance model needs drive.speed; try --model full")
+    for name, spring in mechanism.springs.items():
+        if spring.damping > 0.0:
+            fault = "the clearance model has no dampers; try --model full"
+            raise ConfigError(mechanism.source, f"springs.{name}.damping", fault)
 
 
 def _toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) -> Floats:
@@ -259,12 +266,10 @@ class ClearanceRun:
     Raises
     ------
     ConfigError
-        If the mechanism is not driven by speed.
+        As `check_is_for_clearances`.
     """
 
     def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:
-        if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
-            raise needs_speed(setup.linkage.mechanism)
         self.stepper = ClearanceStepper(setup, length_of(setup, intervals))
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)
@@ -321,7 +326,7 @@ def _contacts() -> ContactArrays:
 
 def _tables() -> ClearanceTables:
     """The smallest tables of one clearance joint, all 0."""
-    width = padded(sum(math.prod(shape) for shape in motion_shapes(1, damped=False).values()))
+    width = padded(sum(math.prod(shape) for shape in motion_shapes(1).values()))
     return ClearanceTables(
         motion=np.zeros((1, width)),
         reaction=np.zeros((1, 1, 1)),
@@ -343,7 +348,6 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
         tolerance=line,
         law=contact_laws(contacts),
         usual=1,
-        damped=0,
         coupling=rigid_coupling(),
         parts=np.zeros(1, np.int64),
     )
@@ -393,7 +397,7 @@ def under_trial_force(linkage: Linkage) -> list[Linkage]:
     if mechanism.toe is None:
         return []
     body, point = mechanism.toe
-    loads = [ConstantLoad(body=body, point=point, force=push) for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N))]
+    loads = [Load(body=body, point=point, force=(push,)) for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N))]
     return [
         build_linkage(attrs.evolve(mechanism, loads={**mechanism.loads, "trial of a toe force": load}))
         for load in loads

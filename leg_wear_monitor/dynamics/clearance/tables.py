@@ -94,8 +94,6 @@ class Basis:
     potential : (N,) array
     friction : (N, 3 b, k) array
         Generalised force of a unit friction force in each joint, beyond its force on e.
-    drag : (N, 3 b, d + 1) array
-        Force of dampers against each column of ``all``.
     loaded : tuple of Basis
         Those under the other loads: only the applied forces differ.
     """
@@ -122,7 +120,6 @@ class Basis:
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
         levers = _friction_levers(linkage.arrays, contacts)
         self.friction: Floats = np.broadcast_to(levers, (n, *levers.shape))
-        self.drag = _drag(linkage.arrays, motion.q, self.all)
         curvature = self._curve(linkage, motion.q)  # larger than all other arrays, and not kept
         self._take_forces(linkage, curvature)
         self.loaded = tuple(self._under_load(one, curvature) for one in loaded)
@@ -193,11 +190,6 @@ def derivative(table: Floats) -> Floats:
     return np.asarray(np.fft.irfft(1j * order * np.fft.rfft(table, axis=0), len(table), axis=0))
 
 
-def is_damped(arrays: MechanismArrays) -> bool:
-    """True if a spring has a damper."""
-    return bool((arrays.spring_law[:, 2] > 0.0).any())
-
-
 def _rows(linkage: Linkage, joints: Ints) -> list[int]:
     """Rows of the given joints in the Jacobian, x before y, in the given order."""
     start = dict(zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True))
@@ -213,18 +205,6 @@ def _forces(linkage: Linkage, q: Floats) -> tuple[Floats, Floats, Floats]:
     bare = _forces_at(unloaded, q, rest) if len(arrays.load_body) else force
     stored_energy_at(arrays, q, rest, np.empty((q.shape[1], 2)), energy)
     return force, force - bare, energy
-
-
-def _drag(arrays: MechanismArrays, q: Floats, columns: Floats) -> Floats:
-    """Force (N, 3 b, m) of the springs' dampers, opposite to velocities (N, 3 b, m)."""
-    drag = np.zeros_like(columns)
-    if is_damped(arrays):
-        at_rest = _forces_at(arrays, q, np.zeros_like(q))
-        for j in range(columns.shape[2]):
-            v = np.zeros_like(q)
-            v[:, 1:] = columns[:, :, j].reshape(len(q), -1, 3)
-            drag[:, :, j] = at_rest - _forces_at(arrays, q, v)
-    return drag
 
 
 def _forces_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
@@ -252,21 +232,19 @@ def _friction_levers(arrays: MechanismArrays, contacts: ContactArrays) -> Floats
 Shapes = dict[str, tuple[int, ...]]
 
 
-def motion_shapes(k: int, damped: bool) -> Shapes:
+def motion_shapes(k: int) -> Shapes:
     """Shapes of the parts of a row for k clearance joints, with d = 2 k eccentricities e and crank speed w.
 
     The parts that depend on e come first, as in `changing_shapes`: ``inverse_mass`` of e; ``free``: forces on
     e without contact, coefficients of 1, w' and w^2; ``lever_drive``: slip of each joint per w, which is also
     the coefficient of its friction force in the drive torque; ``load_power``: power of loads, coefficients of
-    (e', w); ``torque_a``: drive torque, coefficient of e''; ``torque_v``: drive torque, coefficients of w e'
-    and of e' (the latter does not depend on e).
+    (e', w); ``torque_a``: drive torque, coefficient of e''; ``torque_v``: drive torque, coefficient of w e'.
 
     The other parts: ``coriolis``: accelerations of e, coefficient of w e'; ``lever``: slip of each joint
-    beyond t . e', coefficient of e'; ``torque``: drive torque, coefficients of (1, w', w^2, w); ``torque_e``:
+    beyond t . e', coefficient of e'; ``torque``: drive torque, coefficients of (1, w', w^2); ``torque_e``:
     coefficients of e (1, w', w^2); ``torque_vv``: quadratic form of e'; ``angle``: angles of the bushing's
     and the journal's body [rad], ``turn``: their derivatives by the crank angle; ``toe``: position,
-    coefficients of 1 and e, and the derivative of the latter by the crank angle; with dampers, ``viscous``:
-    accelerations, and ``damper``: dissipated power as a quadratic form, both in (e', w).
+    coefficients of 1 and e, and the derivative of the latter by the crank angle.
 
     In square parts the second index is the index of the result (in a form, of the first vector), so that
     loops run along rows.
@@ -278,17 +256,15 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
         "lever_drive": (k,),
         "load_power": (d + 1,),
         "torque_a": (d,),
-        "torque_v": (2, d),
+        "torque_v": (d,),
         "coriolis": (d, d),
         "lever": (d, k),
-        "torque": (4,),
+        "torque": (3,),
         "torque_e": (3, d),
         "torque_vv": (d, d),
         "angle": (k, 2),
         "turn": (k, 2),
         "toe": (2, 1 + 2 * d),
-        "viscous": (d, d + 1) if damped else (0, 0),
-        "damper": (d + 1, d + 1) if damped else (0, 0),
     }
 
 
@@ -343,8 +319,8 @@ class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k clearance joints, d = 2 k.
 
     ``motion`` (N + 1, w): rows of `motion_shapes`, with zeros up to a whole number of vectors; ``reaction``
-    (N + 1, 4 + 3 d + k, r): drive torque and reactions of the ideal joints, coefficients of (1, w', w^2, w,
-    e'', w e', e', F_t), with room likewise; ``reaction_joint`` (r,): joint of each, ``DRIVE`` first;
+    (N + 1, 3 + 2 d + k, r): drive torque and reactions of the ideal joints, coefficients of (1, w', w^2,
+    e'', w e', F_t), with room likewise; ``reaction_joint`` (r,): joint of each, ``DRIVE`` first;
     ``stored`` (N + 1, u): parts of the stored energy of `stored_shapes`;
     ``parts`` (N,): parts into which an interval of 1/2048 turn that starts there should be cut, as a float.
 
@@ -424,11 +400,8 @@ def _motion(linkage: Linkage, contacts: ContactArrays, basis: Basis) -> Floats:
         "turn": motion.v[:, bodies, 2],
         "toe": _toe(linkage, motion, basis),
         "load_power": project(basis.all, basis.load[:, :, None]),
-        "damper": project(basis.all, basis.drag),
     }
-    if not basis.drag.any():
-        parts["viscous"] = parts["damper"] = np.zeros((points, 0))
-    shapes = motion_shapes(len(contacts.joint), bool(basis.drag.any()))
+    shapes = motion_shapes(len(contacts.joint))
     width = sum(math.prod(shape) for shape in shapes.values())
     rows = np.zeros((points + 1, padded(width)))
     np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1, out=rows[:-1, :width])
@@ -475,7 +448,6 @@ def _accelerations(basis: Basis) -> dict[str, Floats]:
         "inverse_mass": basis.inverse_mass,
         "coriolis": -2.0 * respond(mass * basis.s_t).transpose(0, 2, 1),
         "free": project(basis.s, free).transpose(0, 2, 1),
-        "viscous": -respond(basis.drag),
     }
 
 
@@ -523,12 +495,11 @@ def _torque(basis: Basis) -> dict[str, Floats]:
     mass = basis.mass[:, None]
     c, c_e = np.einsum("ni,i,ni->n", basis.drive, basis.mass, basis.drive), basis.c_e
     a_t = derivative(project(basis.s, mass * basis.s))
-    drag = project(basis.drive[:, :, None], basis.drag)[:, 0]
     rest = -np.einsum("ni,ni->n", basis.drive, basis.force)
     return {
-        "torque": np.stack([rest, c, 0.5 * derivative(c), drag[:, -1]], axis=1),
+        "torque": np.stack([rest, c, 0.5 * derivative(c)], axis=1),
         "torque_a": project(basis.s, mass * basis.drive[:, :, None])[:, :, 0],
-        "torque_v": np.stack([c_e, drag[:, :-1]], axis=1),
+        "torque_v": c_e,
         "torque_e": np.stack([-basis.drive_force_e, c_e, 0.5 * derivative(c_e)], axis=1),
         "torque_vv": (basis.b_e - 0.5 * a_t).transpose(0, 2, 1),
     }
@@ -565,8 +536,7 @@ def _reaction(linkage: Linkage, _contacts: ContactArrays, basis: Basis) -> Float
     """Table ``reaction``."""
     mass, (rows, _) = basis.mass[:, None], _ideal_rows(linkage, basis)
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
-    by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
-    by.append(basis.drag[:, :, :-1])
+    by += [mass * basis.s, 2.0 * mass * basis.s_t]
     others = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
     by_friction = project(-basis.friction, basis.x[:, :, rows])
     columns = np.concatenate([others, by_friction], axis=1)

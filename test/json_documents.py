@@ -39,8 +39,6 @@ def life() -> Iterator[Row]:
     texts = descriptions(lw.Life)
     yield "mechanism", "text", "", "Name of the mechanism."
     yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
-    counted = "Whether its wear is counted; false for a pair without wear coefficient, whose clearance stays."
-    yield "validity.<joint>.is_counted", "true or false", "", counted
     yield "validity.<joint>.mean_pressure_speed_pa_mps", *_LOAD
     beyond = "What of it is beyond the limits of the joint's material; None within them."
     yield "validity.<joint>.outside_limits", "text or null", "", beyond

@@ -138,15 +138,14 @@ def conformity_doubts(linkage: Linkage) -> Iterator[Doubt]:
     force = np.linalg.norm(one_cycle(linkage, _POINTS, drive.speed).joint_force, axis=2)
     p99 = dict(zip(mechanism.joints, np.quantile(force, 0.99, axis=0).tolist(), strict=True))
     for joint in mechanism.clearance_joints:
-        settings = mechanism.clearances[joint]
-        fault = contact_doubt(
-            half_angle_of(settings, p99[joint]),
-            p99[joint],
-            settings.bushing_radius,
-            settings.normal_law == "winkler",
-        )
-        if fault:
+        if fault := doubt_under_load(mechanism.clearances[joint], p99[joint]):
             yield Doubt(f"clearances ({joint}): normal_law", fault)
+
+
+def doubt_under_load(settings: Clearance, force_n: float) -> str | None:
+    """Why the normal law of a joint with these settings is not valid at a force; None if it is."""
+    psi = half_angle_of(settings, force_n)
+    return contact_doubt(psi, force_n, settings.bushing_radius, settings.normal_law == "winkler")
 
 
 def half_angle_of(settings: Clearance, force_n: float) -> float:

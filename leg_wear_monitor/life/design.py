@@ -27,7 +27,6 @@ from leg_wear_monitor.mechanism.materials import (
     USUAL_SPREAD,
     Bushing,
     BushingLoad,
-    lacks_wear,
     load_material,
     materials,
     spread_of,
@@ -62,10 +61,10 @@ class BushingLife:
         True if nine of ten such bushings last the hours wanted.
     limited_by : str
         ``p``, ``v``, ``p v`` or ``impact`` if a limit of the maker is exceeded, so that no life holds; else
-        ``wear``; ``nothing`` without wear; ``unknown`` if the pair gives no wear coefficient.
+        ``wear``, or ``nothing`` without wear.
     wear_h : tuple of three floats, or None
-        Hours until the clearance reaches its limit, as 10th, 50th and 90th percentile; None without a wear
-        coefficient, or if the joint does not wear.
+        Hours until the clearance reaches its limit, as 10th, 50th and 90th percentile; None if the joint
+        does not wear.
     load : BushingLoad
         Pressure and sliding speed with the pair's limits.
     peak_pressure_pa : float
@@ -108,7 +107,7 @@ def design(
     limit_m : float
         Mean clearance at which a joint's life ends [m].
     pairs : sequence of str, optional
-        Material pairs to try; all that come with the package if not given.
+        Material pairs to try; if not given, all that come with the package and have a wear coefficient.
     diameters_m, widths_m, clearances_m : sequences of float
         Diameters of the pin, widths, and radial clearances when new to try [m].
     progress : callable, optional
@@ -123,7 +122,11 @@ def design(
     ------
     ConfigError, AssemblyError, SimulationError
     """
-    tried = [load_material(name) for name in (materials() if pairs is None else pairs)]
+    tried = {name: load_material(name) for name in (materials() if pairs is None else pairs)}
+    wears = {name: pair.wear_coefficients for name, pair in tried.items()}
+    if pairs is not None and None in wears.values():
+        name = next(name for name, wear in wears.items() if wear is None)
+        raise ConfigError("materials", "", f"{name} gives no wear coefficient of both bodies")
     present = {joint: mechanism.clearances[joint] for joint in mechanism.clearance_joints}
     fresh = [*clearances_m, *(own.radial_clearance for own in present.values())]
     radii = [*(0.5 * each for each in diameters_m), *(own.bushing_radius for own in present.values())]
@@ -141,13 +144,14 @@ def design(
         others = [
             attrs.evolve(
                 own,
-                material=pair.name,
-                wear_coefficient=pair.wear_coefficients or (0.0, 0.0),
+                material=tried[name].name,
+                wear_coefficient=wear,
                 bushing_radius=0.5 * diameter,
                 width=width,
                 radial_clearance=clearance,
             )
-            for pair in tried
+            for name, wear in wears.items()
+            if wear is not None
             for diameter, width, clearance in product(diameters_m, widths_m, clearances_m)
         ]
         rows = [_row(mechanism, life, k, forces[k], each, hours, limit_m) for each in others]
@@ -210,11 +214,11 @@ def _row(
     of_pair = Bushing.of(bushing, is_swinging=is_swinging)
     load = of_pair.load(float(forces_n[0]), float(forces_n[1]), float(rubbing_w[0]))
     peak_pa = float(life.peak_force_n[0, k]) / of_pair.area_m2
-    wear_h = None if lacks_wear(bushing) else _wear_hours(bushing, life.clearance_m[:, k], rubbing_w, limit_m)
+    wear_h = _wear_hours(bushing, life.clearance_m[:, k], rubbing_w, limit_m)
     # The scatter of the motion is a few percent; the scatter of wear coefficients is a factor of two.
     away = math.exp(_P90 * (spread_of(bushing, USUAL_SPREAD) or USUAL_SPREAD))
     limited_by = _limited_by(bushing, load, peak_pa, wear_h)
-    surely_h = {"wear": (wear_h or 0.0) / away, "nothing": math.inf}
+    surely_h = {"wear": wear_h / away, "nothing": math.inf}
     return BushingLife(
         joint=joint,
         material=bushing.material,
@@ -224,7 +228,7 @@ def _row(
         is_present=False,
         lasts=surely_h.get(limited_by, 0.0) >= hours,
         limited_by=limited_by,
-        wear_h=(wear_h / away, wear_h, wear_h * away) if wear_h and math.isfinite(wear_h) else None,
+        wear_h=(wear_h / away, wear_h, wear_h * away) if math.isfinite(wear_h) else None,
         load=load,
         peak_pressure_pa=peak_pa,
     )
@@ -240,14 +244,12 @@ def _wear_hours(bushing: Clearance, clearance_m: Floats, rubbing_w: Floats, limi
     return float(step * (slowness.sum() - 0.5 * (slowness[0] + slowness[-1]))) / 3600.0
 
 
-def _limited_by(bushing: Clearance, load: BushingLoad, peak_pa: float, wear_h: float | None) -> str:
-    """The reason for which the life of a bushing ends, or is not known."""
+def _limited_by(bushing: Clearance, load: BushingLoad, peak_pa: float, wear_h: float) -> str:
+    """The reason for which the life of a bushing ends, or is not valid."""
     fractions = load.fractions
     if max(fractions.values(), default=0.0) > 1.0:
         return max(fractions, key=lambda name: fractions[name])
     limits = load_material(bushing.material).limits if bushing.material else None
     if limits and limits.static_pressure and peak_pa > limits.static_pressure.si:
         return "impact"
-    if wear_h is None:
-        return "unknown"
     return "wear" if math.isfinite(wear_h) else "nothing"

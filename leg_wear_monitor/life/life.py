@@ -36,7 +36,6 @@ from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.life.result import Duty, Life
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import limit_fault, suspects
-from leg_wear_monitor.mechanism.materials import check_wear_is_known
 from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
@@ -219,6 +218,13 @@ def life_of(
 MOST_JUMPS = 10_000  # per life; with the default length of a jump, a life takes some 15
 
 
+def check_can_wear(mechanism: Mechanism, joints: Sequence[str]) -> None:
+    """Check that a joint has clearance; raises ConfigError otherwise."""
+    if not tuple(joints):
+        fault = "no joint has clearance, so nothing can wear"
+        raise ConfigError(mechanism.source, "clearances.joints", fault)
+
+
 def check_life(
     clearance_joints: Sequence[str],
     fresh_m: Floats,
@@ -344,7 +350,7 @@ class LifeRun:
         self.settings = settings or LifeSettings()
         self._workers, self._duty = workers, duty
         self._shares = duty.shares if duty else np.ones(1)
-        check_wear_is_known(mechanism, mechanism.clearance_joints if clearances is None else clearances)
+        check_can_wear(mechanism, mechanism.clearance_joints if clearances is None else clearances)
         alike = Leg(
             mechanism=mechanism,
             clearances=clearances,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.geometry import contact_doubt, half_angle_of
+from leg_wear_monitor.contact.geometry import doubt_under_load
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.files import data_frame, finite_or_none, json_text
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import bushing_of, lacks_wear, regime_of
+from leg_wear_monitor.mechanism.materials import bushing_of, regime_of
 from leg_wear_monitor.mechanism.person import with_ground_reaction
 from leg_wear_monitor.mechanism.spec import Mechanism
 
@@ -248,50 +248,20 @@ class Life:
         return data_frame(self.columns(), index=["joint", "cycles"])
 
 
-# Load of the bushings of a leg that wears, for the limits of their makers.
+def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
+    """Validity of each joint's life for ``life --json``, by its load when new, whether it wears or not.
 
-
-def pressure_speed(mechanism: Mechanism, life: Life) -> dict[str, float]:
-    """Mean pressure times sliding speed [Pa m/s] of each joint when new, whether it wears or not.
-
-    It is W / (2 R w) over the period, with W the integral of F_N |v_t| dt over a gait cycle.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-    life : Life
+    The mean of pressure times sliding speed is W / (2 R w) over the period, with W the integral of F_N |v_t|
+    dt over a gait cycle.
     """
     found = {}
     for k, joint in enumerate(life.clearance_joints):
-        settings = mechanism.clearances[joint]
-        area_m2 = 2.0 * settings.bushing_radius * settings.width
-        found[joint] = float(life.rubbing_j_per_cycle[0, k]) / (area_m2 * life.period_s)
-    return found
-
-
-def contact_doubts(mechanism: Mechanism, life: Life) -> dict[str, str]:
-    """Joints with a normal law that is not valid at their largest peak force when new, and the reason."""
-    found = {}
-    for k, joint in enumerate(life.clearance_joints):
-        settings, force_n = mechanism.clearances[joint], float(life.peak_force_n[0, k])
-        psi = half_angle_of(settings, force_n)
-        doubt = contact_doubt(psi, force_n, settings.bushing_radius, settings.normal_law == "winkler")
-        if doubt:
-            found[joint] = doubt
-    return found
-
-
-def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
-    """Validity of each joint's life for ``life --json``; same parameters as `pressure_speed`."""
-    loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
-    found = {}
-    for joint in life.clearance_joints:
-        settings, load = mechanism.clearances[joint], loads[joint]
+        settings, bushing = mechanism.clearances[joint], bushing_of(mechanism, joint)
+        load = float(life.rubbing_j_per_cycle[0, k]) / (bushing.area_m2 * life.period_s)
         found[joint] = {
             "holds_for": regime_of(settings),
-            "is_counted": not lacks_wear(settings),
             "mean_pressure_speed_pa_mps": load,
-            "outside_limits": bushing_of(mechanism, joint).loaded(0.0, 0.0, 0.0, load).outside_limits,
-            "outside_contact_law": contacts.get(joint),
+            "outside_limits": bushing.loaded(0.0, 0.0, 0.0, load).outside_limits,
+            "outside_contact_law": doubt_under_load(settings, float(life.peak_force_n[0, k])),
         }
     return found

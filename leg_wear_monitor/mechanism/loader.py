@@ -15,7 +15,7 @@ from leg_wear_monitor.configuration.strict import choose, mapping, read_document
 from leg_wear_monitor.errors import ConfigError, did_you_mean
 from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.mechanism import spec
-from leg_wear_monitor.mechanism.materials import lacks_wear, load_material, regimes, settings_of, spread_of
+from leg_wear_monitor.mechanism.materials import load_material, regimes, settings_of, spread_of
 from leg_wear_monitor.mechanism.position import TURN, Linkage, one_cycle, point_motion
 from leg_wear_monitor.mechanism.spec import (
     GROUND,
@@ -152,12 +152,6 @@ def _clearance(c: spec.Clearance) -> Iterator[Doubt]:
     yield from unusual(c)
     if fault := ratio_fault(c.radial_clearance, c.bushing_radius):
         yield Doubt("radial_clearance", fault)
-    if lacks_wear(c):
-        fault = (
-            "gives no wear coefficient, so the joint does not wear. Expected "
-            "wear_coefficient next to material"
-        )
-        yield Doubt("material", f"{c.material} {fault}")
     spread = spread_of(c, math.inf)
     if spread is not None and spread < _LEAST_SPREAD:
         fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}. Is it from repeats?"
@@ -406,6 +400,12 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
         if given is own or "material" not in own:  # skip the default pair if the joint has one
             merged = _over(merged, of_pair)
         merged = _over(merged, given)
+    if "material" in merged and merged["wear_coefficient"] is None:
+        place = place if "material" in own else "clearances.defaults"
+        fault = (
+            f"is missing: {merged['material']} gives none of both bodies. Expected one next to the material"
+        )
+        raise ConfigError(source, f"{place}.wear_coefficient", f"{fault} [1/Pa], or 0 for no wear")
     try:
         return structure(merged, Clearance, source, "")
     except ConfigError as error:

@@ -10,7 +10,6 @@ import attrs
 
 from leg_wear_monitor.configuration import FieldError, choice, described
 from leg_wear_monitor.configuration.strict import Library
-from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
 # Units of the files of materials and drives: the measured quantity, and the factor to SI.
@@ -501,10 +500,10 @@ _BESIDE = "a value beside "  # a wear coefficient of the mechanism file, in plac
 def settings_of(pair: Material) -> dict[str, Any]:
     """Settings of a clearance joint that a pair gives, as a mechanism file would have them.
 
-    A pair without a wear coefficient gives 0, because the coefficient of a different pair must not take its
-    place.
+    The coefficient of a different pair must not take the place of a missing one, which is None.
     """
-    given: dict[str, Any] = {"wear_coefficient": list(pair.wear_coefficients or (0.0, 0.0))}
+    wear = pair.wear_coefficients
+    given: dict[str, Any] = {"wear_coefficient": None if wear is None else list(wear)}
     for key in ("youngs_modulus", "poissons_ratio"):
         sides = getattr(pair.bushing, key), getattr(pair.journal, key)
         if None not in sides:
@@ -514,42 +513,12 @@ def settings_of(pair: Material) -> dict[str, Any]:
     return given
 
 
-def lacks_wear(settings: Clearance) -> bool:
-    """True if a joint's pair gives no wear coefficient, and the joint has no value of its own."""
-    if not settings.material or max(settings.wear_coefficient) > 0.0:
-        return False
-    return load_material(settings.material).wear_coefficients is None
-
-
-def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
-    """Check that there is a wear coefficient to compute a life from.
-
-    Raises
-    ------
-    ConfigError
-        If no joint has clearance, or if the pairs of all joints have limits only; it names the first joint.
-    """
-    if not tuple(joints):
-        raise ConfigError(
-            mechanism.source, "clearances.joints", "no joint has clearance, so nothing can wear"
-        )
-    known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
-    if known and all(lacks_wear(each) for each in known):
-        raise ConfigError(
-            mechanism.source,
-            f"clearances.joints.{joints[0]}.wear_coefficient",
-            f"is missing for a life: {known[0].material} has no wear coefficient of both bodies. "
-            "Expected one next to the material [1/Pa]",
-        )
-
-
 def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
     """The joints by the validity of their wear: pair and regime, or a bare coefficient."""
     found: dict[str, list[str]] = {}
     for joint in joints:
         settings = mechanism.clearances[joint]
         wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
-        wear = "not known: no wear is modelled" if lacks_wear(settings) else wear
         found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found
 
@@ -559,7 +528,7 @@ def regime_of(settings: Clearance) -> str:
     if not settings.material:
         return "no material is named, so the regime is not known"
     pair = load_material(settings.material)
-    own = "" if lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients else _BESIDE
+    own = "" if settings.wear_coefficient == pair.wear_coefficients else _BESIDE
     return f"{own}{pair.name} ({pair.regime})"
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.materials import lacks_wear
 from leg_wear_monitor.report.figure import (
     BLUE,
     BODY_COLOURS,
@@ -122,9 +121,6 @@ def _question(results: StudyResults) -> list[Part]:
         "so a single run is only an example."
     )
     joints = list(dict.fromkeys(name for point in results.points for name in point.settings["clearances"]))
-    lacking = [joint for joint in joints if lacks_wear(results.mechanism.clearances[joint])]
-    if lacking:
-        text += f" The material pair of {', '.join(lacking)} has no wear coefficient, so its wear is unknown."
     caption = f"The leg to scale. Clearance joints of this study: {', '.join(joints)}."
     return [
         Text(text),

@@ -31,9 +31,7 @@ def test_life_tells_regime_and_limits(run, refused, shipped, tmp_path):
     text = shipped("four_bar")
     limited = text.replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry")
     (tmp_path / "limited.yaml").write_text(limited)
-    assert "wear_coefficient: is missing for a life: du-on-steel-dry" in refused(
-        "life", "--mechanism", "limited.yaml"
-    )
+    assert "wear_coefficient: is missing: du-on-steel-dry" in refused("life", "--mechanism", "limited.yaml")
     (tmp_path / "beside.yaml").write_text(
         text.replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry\n    wear_coefficient: 1.0e-15")
     )

@@ -77,16 +77,14 @@ def test_a_value_beside_the_pair_comes_first() -> None:
     assert settings.friction.coefficient == 0.3
 
 
-def test_a_pair_with_limits_only_does_not_take_the_coefficient_of_another() -> None:
-    limited = leg(A={}, G={"material": "du-on-steel-dry"}, I={"material": "du-on-steel-dry"})
-    assert limited.clearances["G"].wear_coefficient == (0.0, 0.0)
-    (doubt,) = doubts(A={}, G={"material": "du-on-steel-dry"}, I={"material": "du-on-steel-dry"})
-    assert "clearances (G, I): material: du-on-steel-dry gives no wear coefficient" in doubt
+def test_a_pair_with_limits_only_needs_a_coefficient_and_takes_none_of_another() -> None:
     with pytest.raises(lw.ConfigError) as caught:
-        lw.LifeRun(limited, clearances=["G", "I"])
+        leg(A={}, G={"material": "du-on-steel-dry"})
     line = str(caught.value)
     assert "\n" not in line
-    assert "clearances.joints.G.wear_coefficient: is missing for a life: du-on-steel-dry" in line
+    assert "clearances.joints.G.wear_coefficient: is missing: du-on-steel-dry" in line
+    given = leg({"material": "du-on-steel-dry"}, A={"wear_coefficient": 0}, G={"wear_coefficient": 1.0e-16})
+    assert [given.clearances[joint].wear_coefficient[0] for joint in "AG"] == [0.0, 1.0e-16]
 
 
 def test_a_pair_without_modulus_does_not_take_that_of_another() -> None:
@@ -94,7 +92,10 @@ def test_a_pair_without_modulus_does_not_take_that_of_another() -> None:
     document = copy.deepcopy(DOCUMENT)
     for key in ("youngs_modulus", "poissons_ratio"):
         del document["clearances"]["defaults"][key]
-    document["clearances"]["joints"] = {"A": {}, "G": {"material": "dp4b-on-steel-dry"}}
+    document["clearances"]["joints"] = {
+        "A": {},
+        "G": {"material": "dp4b-on-steel-dry", "wear_coefficient": 0},
+    }
     with pytest.raises(lw.ConfigError, match=r"leg\.yaml: clearances\.joints\.G\.youngs_modulus: is missing"):
         mechanism_of(document)
     document["clearances"]["joints"]["G"] |= {
@@ -108,10 +109,9 @@ def test_a_pair_without_modulus_does_not_take_that_of_another() -> None:
 
 def test_the_joints_by_what_their_wear_holds_for() -> None:
     beside = {"material": "du-on-steel-dry", "wear_coefficient": [1.0e-16, 0.0]}
-    text = checked(A={}, B={}, G={"material": "du-on-steel-dry"}, I=beside).out
+    text = checked(A={}, B={}, I=beside).out
     for words in (
         "material of A, B: steel-on-steel-greased-mild (greased, mild), wear coefficient 1e-15 1/Pa",
-        "material of G: du-on-steel-dry (dry), wear coefficient not known: no wear is modelled",
         "material of I: a value beside du-on-steel-dry (dry), wear coefficient 1e-16 and 0 1/Pa",
     ):
         assert words in text

@@ -211,7 +211,7 @@ def test_the_load_follows_from_forces_and_rubbing() -> None:
 def test_joints_that_swing_have_limits_of_their_own() -> None:
     """iglidur H: 196 ft/min where it turns, 137 ft/min where it swings; A and B are the crank's."""
     document = document_of("bionic_leg")
-    document["clearances"]["defaults"]["material"] = "iglidur-h-on-steel"
+    document["clearances"]["defaults"] |= {"material": "iglidur-h-on-steel", "wear_coefficient": 0}
     limited = mechanism_of(document)
     speeds = {joint: bushing_of(limited, joint).sliding_speed_mps for joint in limited.clearances}
     assert speeds["G"] == pytest.approx(137 * 0.3048 / 60)

@@ -70,9 +70,14 @@ def _life(leg: "Mechanism", duty: str | None, wear_factor: float, **options: Any
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.life import LifeRun, LifeSettings, check_life, simulate_life
+    from leg_wear_monitor.life.life import (
+        LifeRun,
+        LifeSettings,
+        check_can_wear,
+        check_life,
+        simulate_life,
+    )
     from leg_wear_monitor.life.result import Duty
-    from leg_wear_monitor.mechanism.materials import check_wear_is_known
 
     # options that were not given have the defaults of LifeSettings
     names = "legs", "cycles", "max_wear_per_jump_m"
@@ -81,7 +86,7 @@ def _life(leg: "Mechanism", duty: str | None, wear_factor: float, **options: Any
     loads = None if duty is None else Duty.parse(duty)
     # bad settings are refused before the kernels are compiled, which takes a while
     joints = clearance_settings(leg, leg.clearance_joints)
-    check_wear_is_known(leg, leg.clearance_joints)
+    check_can_wear(leg, leg.clearance_joints)
     sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
     clearance_m, radius_m = sizes.reshape(-1, 2).T
     check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.max_wear_per_jump_m)
@@ -113,10 +118,7 @@ def life_lines(result: "Life", limit_m: float, validity: dict[str, Any]) -> list
     lines.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
     ends = result.end(limit_m)
     for joint in (*result.clearance_joints, *(["leg"] if result.duty else [])):
-        if joint in validity and not validity[joint]["is_counted"]:
-            lines.append(f"{joint} has no modelled wear, because its material pair has no wear coefficient")
-        else:
-            lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
+        lines.append(f"{joint} {_life_end(result, ends[joint], limit_m)}")
     for joint, known in validity.items():
         lines.append(f"{joint} holds for {known['holds_for']}")
         doubts = filter(None, (known["outside_limits"], known["outside_contact_law"]))
@@ -227,12 +229,11 @@ def design_lines(table: "Sequence[BushingLife]", hours: float) -> list[str]:
     return lines
 
 
-_LIVES = {"nothing": "does not wear", "unknown": "not known: the pair has no wear coefficient"}
-
-
 def _design_line(joint: str, row: "BushingLife") -> str:
-    life = _LIVES.get(row.limited_by, f"not valid: {row.limited_by} exceeds the maker's limit")
-    if row.limited_by == "wear" and row.wear_h:
+    life = f"not valid: {row.limited_by} exceeds the maker's limit"
+    if row.limited_by == "nothing":
+        life = "does not wear"
+    elif row.limited_by == "wear" and row.wear_h:
         p10, p50, p90 = (f"{float(f'{each:.3g}'):g}" for each in row.wear_h)
         life = f"{p50} ({p10} to {p90})"
     sizes = f"{1e3 * row.diameter_m:8g}{1e3 * row.width_m:10g}{1e6 * row.clearance_m:14g}"

@@ -1,7 +1,6 @@
 """The clearance joints of a replay: one row per joint, and the marks in the drawing of the leg."""
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -250,10 +249,7 @@ def _note(views: Sequence[JointView], life: tuple[int, int] | None) -> str:
 # The leg as an inline drawing, its clearance joints marked by how much of their limit is used.
 
 
-_DRAWING, _LABELS = 400.0, 176.0  # width of the drawing, and of the column of labels at its right
-_MARGIN, _TALLEST = 20.0, 400.0
-_LABEL_HEIGHT, _LINE = 40.0, 17.0  # with one line of the joint's label, and of each further one
-_LETTERS, _CAPITALS = 17, 11  # of a label that fit into a line
+_WIDEST, _TALLEST, _MARGIN = 260.0, 400.0, 30.0  # of the drawing; room for letters around it
 _APART = 11.0  # joints at one place are drawn side by side
 _NEAR_M = 1.0e-3
 
@@ -266,8 +262,7 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
     places = [place for shape in leg.bodies_m.values() for place in shape]
     xs, ys = zip(*places, *(joint.place_m for joint in leg.joints.values()), strict=True)
     wide, tall = max(max(xs) - min(xs), 1.0e-6), max(max(ys) - min(ys), 1.0e-6)
-    scale = min((_DRAWING - _LABELS - 2.0 * _MARGIN) / wide, (_TALLEST - 2.0 * _MARGIN) / tall)
-    height = max(scale * (max(ys) - min(ys)) + 2.0 * _MARGIN, 160.0)
+    scale = min((_WIDEST - 2.0 * _MARGIN) / wide, (_TALLEST - 2.0 * _MARGIN) / tall)
 
     def at(place: Place) -> Place:
         """Convert from the plane of the leg [m], y upwards, to the drawing, y downwards."""
@@ -283,43 +278,17 @@ def leg_drawing(summary: ReplaySummary, views: Sequence[JointView]) -> str:
 
     drawn = [view for view in views if view.joint in leg.joints]
     shown = {view.joint for view in views}
-    marks = _marks([(view, *beside(view)) for view in drawn], height)
     bodies = sorted(leg.bodies_m.values(), key=_size, reverse=True)
     drawing = {
-        "width": _DRAWING,
-        "height": max([height, *(mark["label_y"] + mark["more"] + _LABEL_HEIGHT / 2.0 for mark in marks)]),
-        "line": _LINE,
-        "label_x": _DRAWING - _LABELS + 14.0,
+        "width": round(scale * wide + 2.0 * _MARGIN, 1),
+        "height": round(scale * tall + 2.0 * _MARGIN, 1),
         "bodies": [[at(place) for place in shape] for shape in bodies],
         "supports": sorted({at(joint.place_m) for joint in leg.joints.values() if joint.is_on_ground}),
         "ideal": [at(joint.place_m) for name, joint in leg.joints.items() if name not in shown],
-        "marks": marks,
-        "title": f"The leg {summary.monitor.mechanism}: "
-        + "; ".join(f"joint {leg.joint_words(mark['view'].joint)} {mark['words']}" for mark in marks),
+        "marks": [(view, *beside(view)) for view in drawn],
+        "title": f"The leg {summary.monitor.mechanism} with joints {', '.join(view.joint for view in drawn)}",
     }
     return render("replay/leg.html", drawing=drawing)
-
-
-def _marks(placed: Sequence[tuple[JointView, float, float]], height: float) -> list[dict[str, Any]]:
-    """Marks with their labels in a column, from the highest joint to the lowest, without overlap."""
-    marks, below = [], 0.0
-    lines = {view.joint: _lines(view.label) for view, _, _ in placed}
-    more = {joint: 0.5 * _LINE * max(0, len(each) - 1) for joint, each in lines.items()}
-    above = max(0.0, height - sum(_LABEL_HEIGHT + 2.0 * each for each in more.values()))
-    for view, x, y in sorted(placed, key=lambda each: each[2]):
-        half = more[view.joint] + _LABEL_HEIGHT / 2.0
-        label_y = max(below + half, min(y, above + half))
-        below, above = label_y + half, above + 2.0 * half
-        marks.append({
-            "view": view, "x": x, "y": y, "label_y": label_y, "words": _words(view),
-            "lines": lines[view.joint], "more": more[view.joint],
-        })  # fmt: skip
-    return marks
-
-
-def _lines(label: str) -> list[str]:
-    """A joint's label in lines that fit next to the drawing."""
-    return textwrap.wrap(label, _CAPITALS if label.isupper() else _LETTERS)
 
 
 def _size(shape: Sequence[Place]) -> float:
@@ -328,16 +297,3 @@ def _size(shape: Sequence[Place]) -> float:
 
 def _is_near(one: Place, other: Place) -> bool:
     return max(abs(one[0] - other[0]), abs(one[1] - other[1])) < _NEAR_M
-
-
-def _words(view: JointView) -> str:
-    known = view.clearance
-    if known is None or known.best_estimate_m is None:
-        return NOT_VALID if known else "not known"
-    if view.used is None:
-        return "not monitored"
-    if view.used >= 1.0:
-        return f"{1.0e3 * known.best_estimate_m:.3g} mm, limit {1.0e3 * known.limit_m:.3g} mm"
-    if view.look == "over":  # the verdict says so, and is newer than the joint's last report
-        return "at its limit, see the verdict"
-    return f"{100.0 * view.used:.0f} % used"

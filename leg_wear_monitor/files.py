@@ -5,7 +5,7 @@ import glob
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, TypeVar
@@ -208,12 +208,12 @@ def package_version() -> str:
 # Tables in pandas form; pandas is imported only if a caller asks for one.
 
 
-def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None) -> "pd.DataFrame":
-    """Columns of equal length as a data frame.
+def data_frame(columns: Any, index: str | list[str] | None = None) -> "pd.DataFrame":
+    """Columns of equal length, or rows, as a data frame.
 
     Parameters
     ----------
-    columns : mapping of str to sequence
+    columns : mapping of str to sequence, or list of dict
     index : str or list of str, optional
         Columns that name the rows.
 
@@ -226,7 +226,7 @@ def data_frame(columns: Mapping[str, Any], index: str | list[str] | None = None)
         import pandas as pd
     except ModuleNotFoundError as error:
         raise LegWearError("tables need pandas, which is not installed; pip install pandas") from error
-    frame = pd.DataFrame(dict(columns))
+    frame = pd.DataFrame(columns)
     return frame if index is None else frame.set_index(index)
 
 

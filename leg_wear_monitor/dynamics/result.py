@@ -1,6 +1,6 @@
 """The result of a simulation: its parts in SI units, as JSON and as tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -305,67 +305,19 @@ class Trace:
 _OF_EVERY_JOINT = ("mean_force_n", "rms_force_n", "p99_force_n", "max_force_n")
 
 
-# Tables of a simulation's result; a column's name is the path of the value, joined by dots.
-
-
-Columns = dict[str, Sequence[Any] | Floats]
-
-_PARTS = {
-    "wear_depth_m_per_cycle": tuple(field.name for field in attrs.fields(WearDepth)),
-    "wear_zone_deg": ("from", "to"),
-    "clearance_m": tuple(field.name for field in attrs.fields(ClearanceResult)),
-}
-
-
-def joint_columns(joints: Mapping[str, JointResult]) -> Columns:
-    """Columns with a row for each joint; None for contact and wear of joints without clearance."""
-    rows = [{"joint": name, **_cells(joint)} for name, joint in joints.items()]
-    return {name: [row[name] for row in rows] for name in rows[0]}
-
-
-def impact_columns(impacts: Mapping[str, Sequence[Impact]]) -> Columns:
-    """Columns with a row for each impact, joint by joint."""
-    rows = [(name, impact) for name, all_ in impacts.items() for impact in all_]
-    columns: Columns = {"joint": [name for name, _ in rows]}
-    for field in attrs.fields(Impact):
-        columns[field.name] = [getattr(impact, field.name) for _, impact in rows]
-    return columns
-
-
-def trace_columns(trace: Trace) -> Columns:
-    """Columns with a row for each sample; x and y of a vector, and a joint's name, after a dot."""
-    columns: Columns = {}
-    for name, value in attrs.asdict(trace, recurse=False).items():
-        if name == "joints":
-            for joint, part in value.items():
-                for key, column in attrs.asdict(part).items():
-                    columns |= _parts_of(f"{name}.{joint}.{key}", column)
-        elif isinstance(value, dict):
-            columns |= {f"{name}.{joint}": column for joint, column in value.items()}
+def _flat(record: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Known values of a JSON object by path: ends of a zone as from and to, vectors as x and y."""
+    found: dict[str, Any] = {}
+    for key, value in record.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{path}{key}.")
+        elif key == "wear_zone_deg" and value is not None:
+            found |= {f"{path}{key}.from": value[0], f"{path}{key}.to": value[1]}
+        elif isinstance(value, list) and isinstance(value[0], list):
+            found |= {f"{path}{key}.{axis}": [pair[k] for pair in value] for k, axis in enumerate("xy")}
         elif value is not None:
-            columns |= _parts_of(name, value)
-    return columns
-
-
-def _parts_of(name: str, column: Floats) -> Columns:
-    if column.ndim == 1:
-        return {name: column}
-    return {f"{name}.{axis}": column[:, i] for i, axis in enumerate("xy")}
-
-
-def _cells(joint: JointResult) -> dict[str, float | str | None]:
-    cells: dict[str, float | str | None] = {}
-    for name, value in attrs.asdict(joint, recurse=False).items():
-        if name not in _PARTS:
-            cells[name] = value
-        else:
-            values = (None,) * len(_PARTS[name]) if value is None else _values(value)
-            cells |= {f"{name}.{part}": one for part, one in zip(_PARTS[name], values, strict=True)}
-    return cells
-
-
-def _values(part: WearDepth | ClearanceResult | tuple[float, float]) -> tuple[float, ...]:
-    return part if isinstance(part, tuple) else attrs.astuple(part)
+            found[f"{path}{key}"] = value
+    return found
 
 
 # The result of a simulation, with its conversion to JSON and to tables.
@@ -489,15 +441,15 @@ class SimulationResult:
     def to_pandas(self) -> "dict[str, pd.DataFrame]":
         """Tables ``joints``, ``impacts`` and, if there is a trace, ``trace``; requires pandas.
 
-        Columns have the names of the fields, parts of a field after a dot: ``clearance_m.mean``.
+        Columns have the names of the fields of the JSON, parts of a field after a dot: ``clearance_m.mean``.
 
         Raises
         ------
         LegWearError
             If pandas is not installed.
         """
-        tables = {
-            "joints": data_frame(joint_columns(self.joints), index="joint"),
-            "impacts": data_frame(impact_columns(self.impacts)),
-        }
-        return tables if self.trace is None else {**tables, "trace": data_frame(trace_columns(self.trace))}
+        record = self.to_dict()
+        joints = [{"joint": name, **_flat(joint)} for name, joint in record["joints"].items()]
+        impacts = [{"joint": name, **one} for name, all_ in record["impacts"].items() for one in all_]
+        tables = {"joints": data_frame(joints, index="joint"), "impacts": data_frame(impacts)}
+        return tables if self.trace is None else {**tables, "trace": data_frame(_flat(record["trace"]))}

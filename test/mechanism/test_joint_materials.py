@@ -83,7 +83,8 @@ def test_a_pair_with_limits_only_needs_a_coefficient_and_takes_none_of_another()
     line = str(caught.value)
     assert "\n" not in line
     assert "clearances.joints.G.wear_coefficient: is missing: du-on-steel-dry" in line
-    given = leg({"material": "du-on-steel-dry"}, A={"wear_coefficient": 0}, G={"wear_coefficient": 1.0e-16})
+    defaults = {"material": "du-on-steel-dry", "wear_coefficient": 0}
+    given = leg(defaults, A={}, G={"wear_coefficient": 1.0e-16})
     assert [given.clearances[joint].wear_coefficient[0] for joint in "AG"] == [0.0, 1.0e-16]
 
 

@@ -158,7 +158,7 @@ def test_a_load_is_constant_or_a_table_over_the_phase():
         "step": {"body": "foot", "point": "toe", "phase": [0.0, 0.5], "force": [[0, 0], [0, 300]]},
     }
     loads = mechanism_of(file).loads
-    assert loads["weight"].force == (0.0, 100.0)
+    assert loads["weight"].force == ((0.0, 100.0),)
     assert (loads["step"].phase, loads["step"].force) == ((0.0, 0.5), ((0.0, 0.0), (0.0, 300.0)))
 
 

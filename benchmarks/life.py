@@ -18,7 +18,7 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient, when_new
 
 HASTE = 500.0
 LENGTHS = (1.0e-5, 1.5e-5, 3.0e-5, 6.0e-5, 1.0e-4)
@@ -88,7 +88,7 @@ def ten_million(leg: Mechanism) -> None:
         )
         for k, joint in enumerate(leg.clearance_joints)
     ]  # fmt: skip
-    coefficient_estimates = [estimate_coefficient(settings, 3e-4) for _ in now]
+    coefficient_estimates = [estimate_coefficient(when_new(settings, 3e-4)) for _ in now]
     for _ in range(2):  # the first makes the draws
         began = time.process_time()
         found = forecast(now, coefficient_estimates, settings, cycle_s=1.0, valid=True)

@@ -32,7 +32,11 @@ from leg_wear_monitor.monitor.forecast.forecast import (
     LegForecast,
     forecast,
 )
-from leg_wear_monitor.monitor.forecast.wear_coefficients import ClearanceAtWear, estimate_coefficient
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    ClearanceAtWear,
+    estimate_coefficient,
+    when_new,
+)
 
 LIMIT_M = 6.0e-4
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
@@ -164,7 +168,7 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
 
 def forecast_of(case: Case, measured: dict[int, ClearanceAtWear]) -> Forecast:
     coefficient_estimates = [
-        estimate_coefficient(SETTINGS, FRESH_M, [measured[k]] if k in measured else [])
+        estimate_coefficient(when_new(SETTINGS, FRESH_M), [measured[k]] if k in measured else [])
         for k in range(len(case.now))
     ]
     return forecast(case.now, coefficient_estimates, SETTINGS, cycle_s=1.0, valid=True)

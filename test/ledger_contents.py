@@ -15,8 +15,7 @@ def contents(entry: Any) -> object:
         return None
     joints = sorted(attrs.astuple(attrs.evolve(j, depth=j.depth.tobytes())) for j in entry.joints)
     alarms = [(a.kind, a.subject, a.level, a.present, a.acknowledged, a.raised_ns) for a in entry.alarms]
-    spans = entry.spans, entry.loads
-    return entry.stamp_ns, joints, sorted(entry.totals.items()), sorted(alarms), spans
+    return entry.stamp_ns, joints, sorted(entry.totals.items()), sorted(alarms), entry.spans
 
 
 def rows_of(path: Path, query: str) -> list[Any]:

@@ -9,7 +9,7 @@ from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientPrior
-from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import ClearanceObservation, Lost
 from leg_wear_monitor.recordings.findings import Finding, Severity
 from leg_wear_monitor.recordings.result import (
@@ -135,7 +135,6 @@ def made_up_summary() -> ReplaySummary:
             answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, first_probability={"A": 1.0},
         ),
         measurements=(Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, 0.2, True, id=3),),
-        walked=(WalkedLoad(300, 2, 2.0, 290.0, 5.0),),
         status=(ReplayStatus(name="gait", level=Level.OK, message="m", values={"cadence_rpm": math.nan}),),
         lost=Lost(
             unmonitored_s=0.5, already_counted=0, faulty={"out_of_range": 1}, conflicting=0, implausible=0,

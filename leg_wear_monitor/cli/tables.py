@@ -12,7 +12,6 @@ from leg_wear_monitor.files import share_directory
 from leg_wear_monitor.monitor.alarm_specs import QUANTITIES
 from leg_wear_monitor.monitor.alarms import ADVICE, duration, raised_values, time_words
 from leg_wear_monitor.monitor.forecast.forecast import three_digits
-from leg_wear_monitor.monitor.ledger.entry import walked_words
 from leg_wear_monitor.monitor.verdict.situation import SOURCES
 from leg_wear_monitor.monitor.verdict.verdict import decision_of, guide_to
 from leg_wear_monitor.state import as_plain
@@ -127,8 +126,6 @@ def print_replay(result: "ReplayResult", wall_s: float, files: Mapping[str, Path
         f"and {result.torque_samples} torque samples, {len(result.history)} gait cycles, "
         f"{result.evidence.doubtful} of them not from this leg"
     )
-    if words := walked_words(monitor.walked):
-        console.print(words, soft_wrap=True)
     if result.is_believable:
         factor = figure(result.duration_s / wall_s)
         console.print(f"speed  {duration(result.duration_s)} in {duration(wall_s)}: {factor} times real time")

@@ -17,22 +17,19 @@ from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
-    Audit,
     ClearancePoint,
     Entry,
     Event,
     JointWear,
-    WalkedLoad,
     clearance_limit_key,
     one_part,
-    together,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Lost
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.statistics import CycleStatistics, SampleStatistics
+from leg_wear_monitor.twin.statistics import SampleStatistics
 from leg_wear_monitor.wear import BUSHING
 
 # Stretches of time whose wear is in the model, so that no wear is added twice.
@@ -133,26 +130,17 @@ class Accounting:
         self._pause_s, self._pause_at_s = 0.0, 0.0  # the last one, and the unmonitored time when it began
         self.without_zero_s = 0.0
         self.commissioned: dict[str, float] = {}
-        self._loads: tuple[WalkedLoad, ...] = ()
         if entry:
             self.commissioned = {
                 name: entry.totals[name] for name in (FRICTION_KEY, SIGMA_KEY) if name in entry.totals
             }
             self._shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
-            self._note_coefficients(entry)
 
     def _take_over(self, joints: dict[str, JointWear]) -> None:
         own = [joints[name] for name in self._twin.clearance_joints]
         self._twin.set_depth(np.stack([joint.depth for joint in own]))
         self.parts = tuple(self._part(k, joint) for k, joint in enumerate(own))
-
-    def _note_coefficients(self, entry: Entry) -> None:
-        """Note how far the parts were worn under a different wear coefficient."""
-        now = dict(zip(self._twin.clearance_joints, self._twin.wear_coefficient_per_pa, strict=True))
-        for joint in entry.joints:
-            if joint.wear_coefficient_per_pa not in (0.0, now[joint.name]):
-                self.note(Audit(entry.stamp_ns, "parameters", "change_coefficient", joint))
 
     def _part(self, k: int, wear: JointWear) -> PartLife:
         """A part of joint k that has walked so much until now."""
@@ -312,17 +300,6 @@ class Accounting:
     def _set_part(self, k: int, part: PartLife) -> None:
         self.parts = (*self.parts[:k], part, *self.parts[k + 1 :])
 
-    def ended(self, statistics: CycleStatistics) -> None:
-        """Count a gait cycle, and the load that acted in it."""
-        self.cycles += 1
-        load = WalkedLoad.of_cycle(statistics.load_peak_n, statistics.moving_s)
-        self._loads = together((*self._loads, load))
-
-    @property
-    def loads(self) -> tuple[WalkedLoad, ...]:
-        """Foot loads over all runs."""
-        return together((*(self.ledger.loads if self.ledger else ()), *self._loads))
-
     def followed(self, samples: SampleStatistics) -> None:
         """Note the time in which the leg was tracked."""
         stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
@@ -394,5 +371,4 @@ class Accounting:
             },
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=(*self._past, *((*span, epoch) for span in self.spans)),
-            loads=self._loads,
         )

@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import ModelError, model_error
-from leg_wear_monitor.monitor.ledger.entry import Audit, CorrectedClearance, IdentifiedLeg, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Audit, Entry, IdentifiedLeg, Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import ClearanceEstimate, CycleReport, JointReport
 from leg_wear_monitor.monitor.verdict.situation import KnownClearance
@@ -60,9 +60,18 @@ class WearModel:
             self.accounting.replaced_ns,
             ledger.corrections if ledger else (),
         )
+        if ledger and ledger.entry:
+            self._note_coefficients(ledger.entry)
         self.last: CycleReport | None = None
         self._error: tuple[LegParameters, ModelError] | None = None
         self.new_m = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
+
+    def _note_coefficients(self, entry: Entry) -> None:
+        """Start the wear of parts again whose wear coefficient has changed since an entry."""
+        joints = {part.name: part for part in entry.joints}
+        for joint, now in zip(self.clearance_joints, self.twin.wear_coefficient_per_pa.tolist(), strict=True):
+            if now > 0.0 and joints[joint].wear_coefficient_per_pa not in (0.0, now):
+                self.accounting.note(self.forecaster.other_coefficient(joints[joint], now, entry.stamp_ns))
 
     @property
     def model_error(self) -> ModelError:
@@ -96,19 +105,10 @@ class WearModel:
         """Set a joint to the clearance estimated from the drive torque, and model its wear from there."""
         stamp_ns, joint = self.twin.intake.followed_stamp_ns, change.subject
         was = self.accounting.correct(joint, change.value)
-        now = self.accounting.wear_of(joint)
-        corrected = CorrectedClearance(
-            stamp_ns=stamp_ns,
-            joint=joint,
-            clearance_m=float(self.twin.clearance_mean_m[self.clearance_joints.index(joint)]),
-            sigma_m=change.sigma,
-            before_m=was.mean_m,
-            wear_m=now.mean_m,
-            replaced_ns=now.replaced_ns,
-        )
+        clearance_m = float(self.twin.clearance_mean_m[self.clearance_joints.index(joint)])
+        wear = self.accounting.wear_of(joint)
         self.accounting.note(Audit(stamp_ns, "diagnosis", "correct_clearance", was))
-        self.accounting.note(corrected)
-        self.forecaster.corrected(corrected)
+        self.accounting.note(self.forecaster.corrected(wear, clearance_m, change.sigma, stamp_ns))
 
     def take_parameters(self, found: LegParameters) -> None:
         """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""

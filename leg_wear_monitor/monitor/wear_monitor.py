@@ -23,7 +23,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     JointWear,
     Measurement,
     VerdictEvent,
-    WalkedLoad,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
@@ -192,7 +191,7 @@ class WearMonitor(OperatorActions):
         if refused:
             statistics = statistics.without_torque
         # Observers: estimates of this gait cycle.
-        self._accounting.ended(statistics)
+        self._accounting.cycles += 1
         for observer in leg.observers:
             observer.end_cycle(statistics, bool(refused))
         # Report, with growth, estimates and forecast.
@@ -319,11 +318,6 @@ class WearMonitor(OperatorActions):
     def measurements(self) -> tuple[Measurement, ...]:
         """Measured clearances, the ledger's first."""
         return self._leg.forecaster.measurements
-
-    @property
-    def walked(self) -> tuple[WalkedLoad, ...]:
-        """Walking since the start of the ledger, or of a run without ledger, by the acting foot load."""
-        return self._accounting.loads
 
     @property
     def last_cycle(self) -> CycleReport | None:

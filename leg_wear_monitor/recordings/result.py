@@ -12,7 +12,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.materials import BushingLoad
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
-from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import ClearanceObservation, Lost
 from leg_wear_monitor.recordings.findings import Finding
 from leg_wear_monitor.state import SCHEMA_VERSION, JointClearance, LegState, Level
@@ -440,8 +440,6 @@ class ReplaySummary(LegState):
         Remaining life of the leg.
     measurements : tuple of Measurement
         Clearances measured by hand, from the ledger.
-    walked : tuple of WalkedLoad
-        Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
     status : tuple of ReplayStatus
         Lines of /diagnostics at the end. After a measurement or a repair in the ledger of a fleet's leg: the
         verdict's lines, and the lines of the recording that are still valid.
@@ -467,7 +465,6 @@ class ReplaySummary(LegState):
     joints: dict[str, ReplayJoint]
     forecast: LegForecast | None
     measurements: tuple[Measurement, ...]
-    walked: tuple[WalkedLoad, ...] = ()
     status: tuple[ReplayStatus, ...]
     lost: Lost
     history: ReplayHistory

@@ -250,7 +250,6 @@ class ReplayResult:
             joints=_joints(self, verdict) if is_known else {},
             forecast=forecast,
             measurements=tuple(monitor.measurements),
-            walked=monitor.walked,
             status=tuple(with_same_fields(ReplayStatus, status) for status in monitor.status()),
             lost=monitor.lost,
             history=_history(self.history),

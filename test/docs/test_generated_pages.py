@@ -178,8 +178,8 @@ def of_drives(name: str) -> str:
 
 PLAIN_TABLES = {
     "binding": "The leg and the parameters that the wear belongs to.",
-    "entry": "The last entry: joints, alarms and totals are of this stamp, spans and loads are in the row of "
-    "its run. The checksum is the CRC-32 of all of them.",
+    "entry": "The last entry: joints, alarms and totals are of this stamp, spans are in the row of its run. "
+    "The checksum is the CRC-32 of all of them.",
     "total": "Counters over all runs, and values in force, such as the limit of each clearance.",
 }
 

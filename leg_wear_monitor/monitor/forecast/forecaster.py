@@ -21,13 +21,9 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     estimate_coefficient,
     usual_prior,
+    when_new,
 )
-from leg_wear_monitor.monitor.ledger.entry import (
-    CorrectedClearance,
-    JointWear,
-    Measurement,
-    Recount,
-)
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
 from leg_wear_monitor.monitor.verdict.verdict import table
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -213,13 +209,13 @@ class Forecaster:
         Of the ledger.
     replaced_ns : sequence of int
         When each joint's part was replaced, 0 if it never was.
-    corrections : sequence of CorrectedClearance and CoefficientSpan
+    corrections : sequence of CorrectedClearance
         Of the ledger.
 
     Attributes
     ----------
     coefficient_estimates : tuple of CoefficientEstimate
-    measurements, corrections : tuples of Measurement, of CorrectedClearance and CoefficientSpan
+    measurements, corrections : tuples of Measurement and of CorrectedClearance
         Of the ledger, and since.
     """
 
@@ -229,7 +225,7 @@ class Forecaster:
         settings: Forecasting,
         measurements: Sequence[Measurement],
         replaced_ns: Sequence[int],
-        corrections: Sequence[Recount] = (),
+        corrections: Sequence[CorrectedClearance] = (),
     ) -> None:
         self._settings, self._clearance_joints = settings, mechanism.clearance_joints
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
@@ -325,13 +321,14 @@ class Forecaster:
     def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
         """Last measurement of each joint's present part, None without one."""
         parts = zip(self._clearance_joints, replaced_ns, strict=True)
-        return tuple(next(reversed(self._of_part(*part)), None) for part in parts)
+        return tuple(
+            next((one for one in reversed(self._of_part(*part)) if not one.is_withdrawn), None)
+            for part in parts
+        )
 
     def _of_part(self, joint: str, replaced_ns: int) -> list[Measurement]:
-        """Measurements of one part of a joint that were not withdrawn."""
-        part = (joint, replaced_ns)
-        known = (one for one in self.measurements if not one.is_withdrawn)
-        return [one for one in known if (one.joint, one.replaced_ns) == part]
+        """Measurements of one part of a joint, including withdrawn ones."""
+        return [one for one in self.measurements if (one.joint, one.replaced_ns) == (joint, replaced_ns)]
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Forget the growth of a joint, and estimate its coefficient from all that is known of its part."""
@@ -343,10 +340,34 @@ class Forecaster:
         k = self._clearance_joints.index(joint)
         self._update_coefficients(k, self._estimate(k, replaced_ns))
 
-    def corrected(self, correction: CorrectedClearance) -> None:
-        """Start the wear of a joint again from a corrected clearance."""
+    def corrected(
+        self, wear: JointWear, clearance_m: float, sigma_m: float, stamp_ns: int, factor: float = 1.0
+    ) -> CorrectedClearance:
+        """Start the wear of a joint again from a known clearance; see `CorrectedClearance`."""
+        correction = CorrectedClearance(
+            stamp_ns=stamp_ns,
+            joint=wear.name,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            wear_m=wear.mean_m,
+            replaced_ns=wear.replaced_ns,
+            measurements=len(self._of_part(wear.name, wear.replaced_ns)),
+            factor=factor,
+        )
         self.corrections += (correction,)
-        self.replaced(correction.joint, correction.replaced_ns)
+        self.replaced(wear.name, wear.replaced_ns)
+        return correction
+
+    def other_coefficient(self, wear: JointWear, now_per_pa: float, stamp_ns: int) -> CorrectedClearance:
+        """Start the wear of a joint again, because its wear coefficient has changed."""
+        estimate = self.coefficient_estimates[self._clearance_joints.index(wear.name)]
+        return self.corrected(
+            wear,
+            estimate.clearance_m(wear.mean_m),
+            estimate.clearance_sigma_m(wear.mean_m),
+            stamp_ns,
+            now_per_pa / wear.wear_coefficient_per_pa,
+        )
 
     def measured(
         self,
@@ -463,20 +484,28 @@ class Forecaster:
 
     def _estimate(self, k: int, replaced_ns: int, *further: ClearanceAtWear) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
-        joint = self._clearance_joints[k]
-        counting = [one for one in self._of_part(joint, replaced_ns) if one.counts]
-        observations = [ClearanceAtWear(one.clearance_m, one.sigma_m, one.wear_m) for one in counting]
-        return estimate_coefficient(
-            self._settings,
-            self._fresh_m[k],
-            [*observations, *further],
-            usual_prior(self._clearances[k]),
-            [one for one in self.corrections if (one.joint, one.replaced_ns) == (joint, replaced_ns)],
-        )
+        part, number = (self._clearance_joints[k], replaced_ns), 0
+        measured = self._of_part(*part)
+        known, prior = when_new(self._settings, self._fresh_m[k]), usual_prior(self._clearances[k])
+        for one in self.corrections:
+            if (one.joint, one.replaced_ns) == part:
+                before = estimate_coefficient(known, _counting(measured[number : one.measurements]), prior)
+                if before.sigma < _SAYS_SOMETHING * prior.sigma:  # otherwise only the nominal one is known
+                    mean = before.mean - math.log(one.factor)
+                    prior = attrs.evolve(prior, mean=mean, sigma=before.sigma)
+                known, number = ClearanceAtWear(one.clearance_m, one.sigma_m, one.wear_m), one.measurements
+        found = estimate_coefficient(known, [*_counting(measured[number:]), *further], prior)
+        return attrs.evolve(found, observations=len(_counting(measured)) + len(further))
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         self.coefficient_estimates = _with(self.coefficient_estimates, k, coefficient_estimate)
         self._last = None
+
+
+def _counting(measured: Sequence[Measurement]) -> list[ClearanceAtWear]:
+    """Measurements that the forecast uses."""
+    counting = (one for one in measured if one.counts and not one.is_withdrawn)
+    return [ClearanceAtWear(one.clearance_m, one.sigma_m, one.wear_m) for one in counting]
 
 
 def _known(rates: Sequence[GrowthRate | None]) -> int:

@@ -1,16 +1,9 @@
 """Estimate of a joint's wear coefficient, and its Bayes update with measured clearances.
 
-The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d the deviation of the part, w the wear that
-the twin has modelled with the nominal coefficient, x the joint's factor on it. The priors are lognormal for x
-and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
-around the estimate: an accepted measurement moves it as far as the data require.
-
-If the drive torque corrected the modelled clearance, c_0, d and w start again from the corrected clearance,
-its error and the wear since; x remains.
-
-If the nominal coefficient was different, w is the wear that the present coefficient would have given, so the
-estimate of x times the coefficient stays, whatever is configured. That holds as soon as something was
-learned; until then the wear is taken as modelled.
+The clearance is c = c_0 + d + x w: c_0 a known clearance, at first the one of a new part, d its error, w the
+wear that the twin has modelled since with the nominal coefficient, x the joint's factor on it. The priors
+are lognormal for x and normal for d; measured clearances have normal errors. d is eliminated in closed form,
+x is on a grid around the estimate: an accepted measurement moves it as far as the data require.
 """
 
 import math
@@ -26,12 +19,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD, regime_of, spread_of
 from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting
-from leg_wear_monitor.monitor.ledger.entry import (
-    CoefficientSpan,
-    CorrectedClearance,
-    JointWear,
-    Recount,
-)
+from leg_wear_monitor.monitor.ledger.entry import JointWear
 
 
 @attrs.frozen(kw_only=True)
@@ -40,8 +28,8 @@ class CoefficientPrior:
 
     Attributes
     ----------
-    sigma : float
-        Standard deviation of this logarithm; its mean is 0.
+    sigma, mean : float
+        Standard deviation and mean of this logarithm.
     basis : str
         Source of the standard deviation, such as ``spread of steel-on-steel-greased-mild``.
     holds_for : str
@@ -49,6 +37,7 @@ class CoefficientPrior:
     """
 
     sigma: float
+    mean: float = 0.0
     basis: str = ""
     holds_for: str = ""
 
@@ -102,13 +91,6 @@ def usual_prior(clearance: Clearance | None = None) -> CoefficientPrior:
     return CoefficientPrior(sigma=of_pair, basis=f"spread of {clearance.material}", holds_for=regime)
 
 
-# Clearances that do not rest on modelled wear: the clearance of a new part, and later estimates by the drive
-# torque.
-#
-# Wear is modelled from each of them on, so only the wear since is multiplied by the estimated factor on the
-# wear coefficient: an opening that the model had missed says nothing about how fast the joint wears.
-
-
 @attrs.frozen
 class ClearanceAtWear:
     """A clearance that is known at some modelled wear: of a new part, corrected, or measured.
@@ -119,39 +101,16 @@ class ClearanceAtWear:
         Mean radial clearance and its standard deviation.
     wear_m : float
         Wear in the twin at that time.
-    from_m : float
-        Measurements belong to this clearance if the wear at them is this much or more, and less than at the
-        next clearance; else to the clearance before.
     """
 
     clearance_m: float
     sigma_m: float
     wear_m: float = 0.0
-    from_m: float = -math.inf
 
 
-def known_clearances(
-    settings: Forecasting, fresh_m: float, corrections: Sequence[Recount]
-) -> list[ClearanceAtWear]:
-    """Known clearances of a part, the oldest first.
-
-    Parameters
-    ----------
-    settings : Forecasting
-    fresh_m : float
-        Nominal clearance when new.
-    corrections : sequence of CorrectedClearance and CoefficientSpan
-        Of this part, in the order of time.
-    """
-    return [
-        ClearanceAtWear(fresh_m, settings.new_clearance_sigma * fresh_m),
-        # a correction opens the joint by far more than a rounding error of the wear
-        *(
-            ClearanceAtWear(c.clearance_m, c.sigma_m, c.wear_m, 0.5 * (c.before_m + c.wear_m))
-            for c in corrections
-            if isinstance(c, CorrectedClearance)
-        ),
-    ]
+def when_new(settings: Forecasting, fresh_m: float) -> ClearanceAtWear:
+    """The clearance of a new part."""
+    return ClearanceAtWear(fresh_m, settings.new_clearance_sigma * fresh_m)
 
 
 GRID = 801
@@ -207,53 +166,50 @@ class CoefficientEstimate:
 
     def clearance_m(self, wear_m: float) -> float:
         """Median of the clearance at some wear in the twin."""
-        worn = wear_m - self.known.wear_m
-        expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
+        expected = self._expected_m(wear_m)
         order = np.argsort(expected)
         reached = np.cumsum(self.weight[order]) - 0.5 * self.weight[order]
         return float(np.interp(0.5, reached, expected[order]))
 
+    def clearance_sigma_m(self, wear_m: float) -> float:
+        """Standard deviation of the clearance at some wear in the twin."""
+        expected = self._expected_m(wear_m)
+        variance = float(self.weight @ np.square(expected - self.weight @ expected))
+        return math.hypot(math.sqrt(variance), self.excess_sigma_m)
+
     def probability_below(self, observation: ClearanceAtWear) -> float:
         """Predicted probability of a smaller measurement with this accuracy at this time."""
-        worn = observation.wear_m - self.known.wear_m
-        expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
         spread = math.hypot(observation.sigma_m, self.excess_sigma_m)
-        below = np.asarray(_phi((observation.clearance_m - expected) / spread), dtype=float)
-        return float(self.weight @ below)
+        off = (observation.clearance_m - self._expected_m(observation.wear_m)) / spread
+        return float(self.weight @ np.asarray(_phi(off), dtype=float))
+
+    def _expected_m(self, wear_m: float) -> Floats:
+        """Mean of the clearance at some wear in the twin, given each factor."""
+        worn = wear_m - self.known.wear_m
+        return self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
 
 
 def estimate_coefficient(
-    settings: Forecasting,
-    fresh_m: float,
+    known: ClearanceAtWear,
     observations: Sequence[ClearanceAtWear] = (),
     prior: CoefficientPrior | None = None,
-    corrections: Sequence[Recount] = (),
 ) -> CoefficientEstimate:
     """Coefficient estimate after measurements of the same part, in any order.
 
     Parameters
     ----------
-    settings : Forecasting
-    fresh_m : float
-        Nominal clearance when new.
+    known : ClearanceAtWear
+        The clearance from which on wear is modelled.
     observations : sequence of ClearanceAtWear
     prior : CoefficientPrior, optional
         Without it, the usual spread about the nominal coefficient.
-    corrections : sequence of CorrectedClearance and CoefficientSpan
-        Of its modelled clearance, in the order of time.
     """
     prior = prior or usual_prior()
-    mean, precision = measured_factor(settings, fresh_m, observations, corrections)
-    if math.sqrt(precision) * mean * prior.sigma < 1.0:
-        # only the nominal coefficient is known, because a new coefficient does not describe earlier wear
-        corrections = [one for one in corrections if not isinstance(one, CoefficientSpan)]
-        mean, precision = measured_factor(settings, fresh_m, observations, corrections)
-    log_factor, log_weight = posterior_grid(prior, mean, precision)
+    log_factor, log_weight = posterior_grid(prior, *measured_factor(known, observations))
     weight = np.exp(log_weight - log_weight.max())
-    known, own = _spans(settings, fresh_m, observations, corrections)[-1]
-    precision = 1.0 / known.sigma_m**2 + sum(observation.sigma_m**-2 for observation in own)
+    precision = 1.0 / known.sigma_m**2 + sum(observation.sigma_m**-2 for observation in observations)
     pull = np.zeros(GRID)
-    for observation in own:
+    for observation in observations:
         opened, worn = observation.clearance_m - known.clearance_m, observation.wear_m - known.wear_m
         pull += (opened - np.exp(log_factor) * worn) / observation.sigma_m**2
     return CoefficientEstimate(
@@ -267,54 +223,12 @@ def estimate_coefficient(
     )
 
 
-def measured_factor(
-    settings: Forecasting,
-    fresh_m: float,
-    observations: Sequence[ClearanceAtWear],
-    corrections: Sequence[Recount] = (),
-) -> tuple[float, float]:
+def measured_factor(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear]) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
-    The likelihood is normal in the factor, not in its logarithm. The clearance from which on wear is modelled
-    is eliminated: it correlates the errors of the measurements after it.
+    The likelihood is normal in the factor, not in its logarithm. The known clearance is eliminated: it
+    correlates the errors of the measurements after it.
     """
-    spans = [_factor_since(*span) for span in _spans(settings, fresh_m, observations, corrections)]
-    product, precision = (sum(each) for each in zip(*spans, strict=True))
-    return (product / precision, precision) if precision else (0.0, 0.0)
-
-
-def _spans(
-    settings: Forecasting,
-    fresh_m: float,
-    observations: Sequence[ClearanceAtWear],
-    corrections: Sequence[Recount],
-) -> list[tuple[ClearanceAtWear, list[ClearanceAtWear]]]:
-    """Known clearances, each with the measurements between it and the next one.
-
-    Their wear is computed with the present coefficient.
-    """
-    counted = [one for one in corrections if isinstance(one, CoefficientSpan)]
-    known = [_recounted(each, counted) for each in known_clearances(settings, fresh_m, corrections)]
-    observations = [_recounted(each, counted) for each in observations]
-    ends = [*(each.from_m for each in known[1:]), math.inf]
-    return [
-        (each, [one for one in observations if each.from_m <= one.wear_m < end])
-        for each, end in zip(known, ends, strict=True)
-    ]
-
-
-def _recounted(one: ClearanceAtWear, counted: Sequence[CoefficientSpan]) -> ClearanceAtWear:
-    """A clearance at the wear that ends with the present one, had all been modelled with its coefficient."""
-
-    def moved(wear_m: float) -> float:
-        steps = ((1.0 - each.factor) * max(0.0, each.to_m - max(wear_m, each.from_m)) for each in counted)
-        return wear_m + sum(steps)
-
-    return attrs.evolve(one, wear_m=moved(one.wear_m), from_m=moved(one.from_m))
-
-
-def _factor_since(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear]) -> tuple[float, float]:
-    """Factor times its precision, and the precision, from measurements after a known clearance."""
     if not any(observation.wear_m != known.wear_m for observation in observations):
         return 0.0, 0.0
     opened, wear, sigma = np.array(
@@ -328,7 +242,7 @@ def _factor_since(known: ClearanceAtWear, observations: Sequence[ClearanceAtWear
     common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))
     precision = float(own @ np.square(wear - common_wear)) + new * common_wear**2
     product = float(own @ ((wear - common_wear) * (opened - common))) + new * common_wear * common
-    return product, precision
+    return product / precision, precision
 
 
 def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tuple[Floats, Floats]:
@@ -341,7 +255,7 @@ def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tu
         Of the factor, from `measured_factor`.
     """
     sigma = prior.sigma
-    low, high = -_WIDTH * sigma, _WIDTH * sigma
+    low, high = prior.mean - _WIDTH * sigma, prior.mean + _WIDTH * sigma
     if precision > 0.0:
         own = precision**-0.5
         # with a mean below 0, positive factors have only the tail, which falls by e over own² / |mean|
@@ -350,7 +264,8 @@ def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tu
         high = max(high, math.log(max(mean, 0.0) + _WIDTH * own))
     for _ in range(_ZOOMS):
         grid = np.linspace(low, high, GRID)
-        density = -0.5 * np.square(grid / sigma) - 0.5 * precision * np.square(np.exp(grid) - mean)
+        off = (grid - prior.mean) / sigma
+        density = -0.5 * np.square(off) - 0.5 * precision * np.square(np.exp(grid) - mean)
         near = np.flatnonzero(density > density.max() - _DEEP)
         first, last = max(near[0] - 1, 0), min(near[-1] + 1, GRID - 1)
         if last - first > GRID // 2:

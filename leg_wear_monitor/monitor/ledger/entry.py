@@ -2,23 +2,19 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
 from typing import Any
 
 import attrs
-import numpy as np
 
 from leg_wear_monitor.estimate.signature import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import Alarm, duration
+from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.state import Verdict
 from leg_wear_monitor.twin.reference import LegParameters
 from leg_wear_monitor.twin.references import TorqueReference
 from leg_wear_monitor.wear import SECTORS
-
-_CLASS_N = 100  # resolution of foot loads
 
 # fields of a mechanism that may change without a change of the worn parts
 # (a person is in the masses of the bodies)
@@ -72,34 +68,6 @@ def binding_of(mechanism: Mechanism, config: MonitorConfig) -> dict[str, str]:
 
 
 @attrs.frozen
-class WalkedLoad:
-    """Gait cycles under foot loads of about one size.
-
-    Attributes
-    ----------
-    about_n : int
-        Largest vertical foot load of each of the cycles, to the nearest 100 N.
-    cycles : int
-        Gait cycles.
-    moving_s : float
-        Time in motion.
-    mean_n, sigma_n : float
-        Mean and standard deviation of the largest vertical foot load of a gait cycle.
-    """
-
-    about_n: int
-    cycles: int
-    moving_s: float
-    mean_n: float
-    sigma_n: float
-
-    @classmethod
-    def of_cycle(cls, peak_n: float, moving_s: float) -> "WalkedLoad":
-        """One gait cycle."""
-        return cls(_CLASS_N * round(peak_n / _CLASS_N), 1, moving_s, peak_n, 0.0)
-
-
-@attrs.frozen
 class Run:
     """A run of the monitor.
 
@@ -117,8 +85,6 @@ class Run:
         Boot of the computer; empty if unknown.
     spans : tuple of (int, int, int)
         Begin and end [ns] of the time spans whose wear is modelled, and their clock epochs.
-    loads : tuple of WalkedLoad
-        Foot loads that acted.
     """
 
     number: int = 0
@@ -127,32 +93,6 @@ class Run:
     epoch: int = 0
     boot_id: str = ""
     spans: tuple[tuple[int, int, int], ...] = ()
-    loads: tuple[WalkedLoad, ...] = ()
-
-
-def together(loads: Iterable[WalkedLoad]) -> tuple[WalkedLoad, ...]:
-    """All cycles under loads of about one size as one, by rising loads."""
-    found: dict[int, list[WalkedLoad]] = {}
-    for load in loads:
-        found.setdefault(load.about_n, []).append(load)
-    return tuple(_one(found[about_n]) for about_n in sorted(found))
-
-
-def _one(loads: list[WalkedLoad]) -> WalkedLoad:
-    cycles, moving_s, mean_n, sigma_n = np.array([attrs.astuple(load)[1:] for load in loads]).T
-    mean = float(np.average(mean_n, weights=cycles))
-    variance = np.average(sigma_n**2 + (mean_n - mean) ** 2, weights=cycles)
-    return WalkedLoad(
-        loads[0].about_n, int(cycles.sum()), float(moving_s.sum()), mean, float(np.sqrt(variance))
-    )
-
-
-def walked_words(loads: Iterable[WalkedLoad]) -> str:
-    """Such as ``walked 12.1 h at 290 N, 2 h at 0 N``, the longest first; empty for a leg in the air."""
-    longest = sorted(loads, key=lambda load: -load.moving_s)
-    if not any(load.about_n for load in longest):
-        return ""
-    return "walked " + ", ".join(f"{duration(load.moving_s)} at {load.mean_n:.0f} N" for load in longest)
 
 
 @attrs.frozen(eq=False)
@@ -218,8 +158,6 @@ class Entry:
         Those that are not OK.
     spans : tuple of (int, int, int)
         Begin and end [ns] of the time spans of this run whose wear is modelled, and their clock epochs.
-    loads : tuple of WalkedLoad
-        Foot loads that acted in this run.
     """
 
     stamp_ns: int
@@ -227,7 +165,6 @@ class Entry:
     totals: dict[str, float]
     alarms: tuple[Alarm, ...] = ()
     spans: tuple[tuple[int, int, int], ...] = ()
-    loads: tuple[WalkedLoad, ...] = ()
 
     @property
     def moving_s(self) -> float:
@@ -339,82 +276,37 @@ class Measurement:
 
 @attrs.frozen
 class CorrectedClearance:
-    """A modelled clearance that was replaced by the one that the drive torque shows.
+    """A clearance from which on the wear of a part counts for the forecast.
+
+    The drive torque has corrected the modelled clearance, or the wear coefficient has changed: the clearance
+    is then the best estimate.
 
     Attributes
     ----------
     stamp_ns : int
     joint : str
     clearance_m : float
-        Mean radial clearance after the correction.
+        Mean radial clearance.
     sigma_m : float
         Its standard deviation.
-    before_m : float
-        Modelled wear of this part.
     wear_m : float
-        Wear in the twin after the correction, which gives this clearance.
+        Wear in the twin at this clearance.
     replaced_ns : int
         When the part was replaced, 0 if it never was.
+    measurements : int
+        Number of measurements of this part before, including withdrawn ones.
+    factor : float
+        Present wear coefficient over the coefficient before.
     """
 
     stamp_ns: int
     joint: str
     clearance_m: float
     sigma_m: float
-    before_m: float
     wear_m: float
     replaced_ns: int
-
-
-@attrs.frozen
-class CoefficientSpan:
-    """Wear of a part that was modelled with a different wear coefficient than the present one.
-
-    Attributes
-    ----------
-    joint : str
-    replaced_ns : int
-        When the part was replaced, 0 if it never was.
-    from_m, to_m : float
-        Modelled wear of this part at begin and end.
-    factor : float
-        Present coefficient over that one.
-    """
-
-    joint: str
-    replaced_ns: int
-    from_m: float
-    to_m: float
-    factor: float
-
-
-Recount = CorrectedClearance | CoefficientSpan
-"""Modelled wear of a part that a forecast takes otherwise than as worn with the present coefficient."""
-
-
-def coefficient_spans(
-    states: Iterable[JointWear], now_per_pa: Mapping[str, float]
-) -> tuple[CoefficientSpan, ...]:
-    """Wear that was modelled with other coefficients than the present coefficients; none if one is unknown.
-
-    Parameters
-    ----------
-    states : iterable of JointWear
-        Of all parts in the order of time, where their coefficient changed at the least, and the present ones.
-    now_per_pa : mapping of str to float
-        Present coefficients of bushing and journal together, by joint.
-    """
-    ends: dict[tuple[str, int], float] = {}
-    spans = []
-    for state in states:
-        part, was, now = (
-            (state.name, state.replaced_ns), state.wear_coefficient_per_pa, now_per_pa.get(state.name, 0.0)
-        )  # fmt: skip
-        begin_m, end_m = ends.get(part, 0.0), state.mean_m
-        ends[part] = max(begin_m, end_m)
-        if was > 0.0 and now > 0.0 and was != now and end_m > begin_m:
-            spans.append(CoefficientSpan(*part, begin_m, end_m, now / was))
-    return tuple(spans)
+    measurements: int = 0
+    factor: float = 1.0
 
 
 @attrs.frozen(eq=False)

@@ -184,7 +184,7 @@ def write_run(db: sqlite3.Connection, run: Run) -> None:
 
 
 def write_entry(db: sqlite3.Connection, run: int, entry: Entry) -> None:
-    """Replace the last entry; its spans and loads are in the row of its run."""
+    """Replace the last entry; its spans are in the row of its run."""
     db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
     for kind in _IN_FORCE:
         db.execute(f"DELETE FROM {TABLES[kind]}")
@@ -212,7 +212,7 @@ def read_entry(db: sqlite3.Connection, runs: Iterable[Run]) -> Entry | None:
         raise ValueError("the checksum of the last entry does not fit its content")
     (run,) = (each for each in runs if each.number == number)
     totals = dict(db.execute("SELECT name, value FROM total"))
-    return Entry(stamp_ns, read(db, JointWear), totals, read(db, Alarm), run.spans, run.loads)
+    return Entry(stamp_ns, read(db, JointWear), totals, read(db, Alarm), run.spans)
 
 
 def _checksum(db: sqlite3.Connection, stamp_ns: int, run: int) -> int:

@@ -26,14 +26,10 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Event,
     IdentifiedLeg,
     Measurement,
-    Recount,
     Run,
     SimulatedReference,
     VerdictEvent,
-    WalkedLoad,
     binding_of,
-    coefficient_spans,
-    together,
 )
 from leg_wear_monitor.monitor.ledger.file import (
     LedgerError,
@@ -68,11 +64,7 @@ class LedgerContent:
     measurements : tuple of Measurement
         Manually measured clearances, including withdrawn ones.
     audits : tuple of Audit
-    corrections : tuple of CorrectedClearance and CoefficientSpan
-        Modelled clearances that the drive torque corrected; with `open_ledger`, also wear that was modelled
-        with wear coefficients other than the leg's now.
-    states : tuple of JointWear
-        Parts as they were before each change of their wear, then as in `entry`.
+    corrections : tuple of CorrectedClearance
     commissioned : Commissioned or None
         Errors of further encoders.
     commissioned_torques : list of CommissionedTorque
@@ -89,18 +81,11 @@ class LedgerContent:
         self.verdict: Verdict | None = verdicts[-1].verdict if verdicts else None
         self.measurements = read(db, Measurement)
         self.audits = read(db, Audit)
-        self.corrections: tuple[Recount, ...] = read(db, CorrectedClearance)
-        former = [audit.joint for audit in self.audits if audit.joint]
-        self.states = (*former, *(self.entry.joints if self.entry else ()))
+        self.corrections = read(db, CorrectedClearance)
         self.commissioned = next(reversed(read(db, Commissioned)), None)
         self.commissioned_torques = commissioned_torques(read(db, CommissionedTorque))
         self.parameters = next(reversed(read(db, IdentifiedLeg)), None)
         self.references = [*reversed(read(db, SimulatedReference))]
-
-    @property
-    def loads(self) -> tuple[WalkedLoad, ...]:
-        """Foot loads of all runs."""
-        return together(load for run in self.runs for load in run.loads)
 
     @property
     def counted_ns(self) -> Ints:
@@ -154,8 +139,7 @@ class Ledger(LedgerContent):
         self._db = connect(self.path, binding)
         self._place = _place(self.path)
         self._interval_s = interval_s
-        self._spans: tuple[tuple[int, int, int], ...] = ()  # spans of this run, as the loads
-        self._loads: tuple[WalkedLoad, ...] = ()
+        self._spans: tuple[tuple[int, int, int], ...] = ()  # of this run
         try:
             with damage_refused(self.path):
                 super().__init__(self._db)
@@ -200,7 +184,7 @@ class Ledger(LedgerContent):
         if self.at_end and not closed:
             return False
         self._interval_s = max(self._interval_s, entry.moving_s - self._kept_moving_s)
-        self._spans, self._loads = entry.spans, entry.loads
+        self._spans = entry.spans
         kept = self._write(self._run(closed), entry)
         if kept:
             self.kept_ns, self._kept_moving_s = entry.stamp_ns, entry.moving_s
@@ -233,7 +217,6 @@ class Ledger(LedgerContent):
             epoch=self.epoch,
             boot_id=self.boot_id,
             spans=self._spans,
-            loads=self._loads,
         )
 
     def _write(self, run: Run, entry: Entry | None = None) -> bool:
@@ -274,11 +257,8 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     """
     if not config.ledger.path:
         return None
-    leg = fitted(mechanism, config)
-    ledger = Ledger(config.ledger.path, binding_of(leg, config), config.ledger.checkpoint_s, at_end)
-    now_per_pa = {joint: sum(leg.clearances[joint].wear_coefficient) for joint in leg.clearance_joints}
-    ledger.corrections += coefficient_spans(ledger.states, now_per_pa)
-    return ledger
+    binding = binding_of(fitted(mechanism, config), config)
+    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s, at_end)
 
 
 def read_ledger(path: Path, binding: Mapping[str, str]) -> LedgerContent:

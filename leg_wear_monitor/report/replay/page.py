@@ -127,13 +127,6 @@ def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
 def health_section(summary: ReplaySummary) -> Section:
     """Chart and tables."""
     parts: list[Part] = [health_chart(summary)] if summary.cycles else []
-    if any(load.about_n for load in summary.walked):
-        walked = [
-            (f"{load.mean_n:.0f} ± {load.sigma_n:.0f}", f"{load.cycles}", duration(load.moving_s))
-            for load in summary.walked
-        ]
-        head = ("largest vertical force of a gait cycle [N]", "gait cycles", "time")
-        parts.append(Table(caption="Walking under foot loads", head=head, rows=walked))
     lost = {**attrs.asdict(summary.lost), **summary.lost.faulty}
     del lost["faulty"]
     parts.append(_numbers("Unused samples and lost time", lost))

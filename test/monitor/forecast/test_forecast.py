@@ -27,6 +27,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientPrior,
     estimate_coefficient,
+    when_new,
 )
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.twin.reference import MASS_TOLERANCE
@@ -48,7 +49,7 @@ def whole(joints, settings=SETTINGS, observations=(), valid=True):
     """Forecast of joints; ``observations`` (joint's number, ClearanceAtWear)."""
     own = [[observation for at, observation in observations if at == k] for k in range(len(joints))]
     coefficient_estimates = [
-        estimate_coefficient(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)
+        estimate_coefficient(when_new(settings, each.fresh_m), o) for each, o in zip(joints, own, strict=True)
     ]
     return forecast(joints, coefficient_estimates, settings, cycle_s=0.5, valid=valid)
 
@@ -188,7 +189,7 @@ def found(wear, mm, earlier=(), **more):
 
 
 def test_without_a_measurement_the_belief_is_the_lognormal_prior():
-    coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
+    coefficient_estimate = estimate_coefficient(when_new(PRIOR, FRESH))
     assert coefficient_estimate.mean == pytest.approx(0.0, abs=1e-12)
     assert coefficient_estimate.sigma == pytest.approx(USUAL_SPREAD, rel=1e-3)
     z = statistics.NormalDist().inv_cdf(0.9)
@@ -200,7 +201,7 @@ def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
     exact = attrs.evolve(PRIOR, new_clearance_sigma=1e-7 / FRESH)
     wear = 1e-4
     coefficient_estimate = estimate_coefficient(
-        exact, FRESH, [ClearanceAtWear(FRESH + factor * wear, 5e-6, wear)]
+        when_new(exact, FRESH), [ClearanceAtWear(FRESH + factor * wear, 5e-6, wear)]
     )
     assert math.exp(coefficient_estimate.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
     assert coefficient_estimate.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
@@ -215,7 +216,7 @@ def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(pow
         ClearanceAtWear(FRESH + factor * 1e-4, sigma, 1e-4),
     ]
     coefficient_estimate = estimate_coefficient(
-        attrs.evolve(PRIOR, new_clearance_sigma=1e-3 / FRESH), FRESH, observations
+        when_new(attrs.evolve(PRIOR, new_clearance_sigma=1e-3 / FRESH), FRESH), observations
     )
     spread = sigma * math.sqrt(2.0) / (factor * 1e-4)
     p10, p50, p90 = np.exp(coefficient_estimate.log_factors((0.1, 0.5, 0.9)))
@@ -243,14 +244,14 @@ def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
 def test_the_order_of_measurements_does_not_matter(order):
     observations = [ClearanceAtWear(FRESH + 1e-5 * (i + 1), 3e-6 + 1e-6 * i, 0.8e-5 * i) for i in range(4)]
     one, other = (
-        estimate_coefficient(PRIOR, FRESH, observations),
-        estimate_coefficient(PRIOR, FRESH, [observations[i] for i in order]),
+        estimate_coefficient(when_new(PRIOR, FRESH), observations),
+        estimate_coefficient(when_new(PRIOR, FRESH), [observations[i] for i in order]),
     )
     np.testing.assert_allclose(one.weight, other.weight, rtol=1e-6, atol=1e-12)
 
 
 def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coefficient():
-    coefficient_estimate = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.05e-4, 5e-6, 0.0)])
+    coefficient_estimate = estimate_coefficient(when_new(PRIOR, FRESH), [ClearanceAtWear(3.05e-4, 5e-6, 0.0)])
     assert coefficient_estimate.sigma == pytest.approx(USUAL_SPREAD, rel=1e-3)
     # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
     np.testing.assert_allclose(coefficient_estimate.excess_m, 2.5e-6)
@@ -258,9 +259,9 @@ def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coeffic
 
 
 def test_a_later_measurement_knows_the_clearance_when_new():
-    alone = estimate_coefficient(PRIOR, FRESH, [ClearanceAtWear(3.5e-4, 2e-6, 5e-5)])
+    alone = estimate_coefficient(when_new(PRIOR, FRESH), [ClearanceAtWear(3.5e-4, 2e-6, 5e-5)])
     both = estimate_coefficient(
-        PRIOR, FRESH, [ClearanceAtWear(3.0e-4, 2e-6, 0.0), ClearanceAtWear(3.5e-4, 2e-6, 5e-5)]
+        when_new(PRIOR, FRESH), [ClearanceAtWear(3.0e-4, 2e-6, 0.0), ClearanceAtWear(3.5e-4, 2e-6, 5e-5)]
     )
     assert both.sigma < 0.7 * alone.sigma
 
@@ -268,7 +269,7 @@ def test_a_later_measurement_knows_the_clearance_when_new():
 def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     """Probability integral transform: figures drawn from the belief fall evenly into it."""
     random, wear = np.random.default_rng(3), 6e-5
-    coefficient_estimate = estimate_coefficient(PRIOR, FRESH)
+    coefficient_estimate = estimate_coefficient(when_new(PRIOR, FRESH))
     drawn = FRESH + PRIOR.new_clearance_sigma * FRESH * random.standard_normal(400)
     drawn += wear * np.exp(USUAL_SPREAD * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
@@ -319,6 +320,25 @@ def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():
     assert result.after.observations == 1
 
 
+@pytest.mark.parametrize("is_measured", [True, False])
+def test_a_changed_coefficient_keeps_the_clearance_and_what_was_measured(is_measured):
+    """The product of factor and coefficient stays if it was measured; otherwise the new coefficient holds."""
+    earlier = [found(worn(6e-5), 0.42).measurement] if is_measured else []
+    wear = attrs.evolve(worn(6e-5), wear_coefficient_per_pa=1e-15)
+    replaced_ns = [0] * len(LEG.clearance_joints)
+    forecaster = Forecaster(LEG, PRIOR, earlier, replaced_ns)
+    before = forecaster.coefficient_estimates[0]
+    correction = forecaster.other_coefficient(wear, 2e-15, HOUR)
+    after = forecaster.coefficient_estimates[0]
+    assert after.mean == pytest.approx(before.mean - math.log(2.0) * is_measured, abs=0.01)
+    assert after.sigma == pytest.approx(before.sigma, rel=0.01)
+    for one in ("clearance_m", "clearance_sigma_m"):
+        then, now = (getattr(each, one)(wear.mean_m) for each in (before, after))
+        assert now == pytest.approx(then, rel=1e-3)
+    again = Forecaster(LEG, PRIOR, earlier, replaced_ns, [correction]).coefficient_estimates[0]
+    np.testing.assert_array_equal(again.weight, after.weight)
+
+
 def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
     assert (early.clock_late_s, early.findings[2], right.findings[2]) == (7200.0, "late_clock", "coefficient")
@@ -330,7 +350,7 @@ def test_the_estimate_is_its_prior_times_the_likelihood(sigma, factor, own):
     """Against a sum over a wide and fine grid."""
     exact = Forecasting(new_clearance_sigma=1e-9 / FRESH)
     observation = ClearanceAtWear(3.0e-4 + factor * 1e-5, own * 1e-5, 1e-5)
-    found = estimate_coefficient(exact, 3.0e-4, [observation], CoefficientPrior(sigma=sigma))
+    found = estimate_coefficient(when_new(exact, 3.0e-4), [observation], CoefficientPrior(sigma=sigma))
     u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
     density = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - factor) / own) ** 2
     weight = np.exp(density - density.max())

@@ -32,7 +32,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Measurement,
     SimulatedReference,
     VerdictEvent,
-    WalkedLoad,
     binding_of,
     fingerprint,
 )
@@ -72,7 +71,6 @@ def entry_at() -> Callable[[int], Entry]:
             totals={"cycles": float(second), "moving_s": 0.9 * second},
             alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN, acknowledged=second % 2 == 1),),
             spans=((0, second * SECOND, 0),),
-            loads=(WalkedLoad(300, second, 0.9 * second, 290.0, 8.0),),
         )
 
     return entry
@@ -429,7 +427,7 @@ EVENTS = [
     AlarmEvent(2, RAISED),
     ClearancePoint(3, 7, "A", 3.0e-4, 4.0e-4),
     Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, counts=True),
-    CorrectedClearance(1, "A", 1e-3, 4e-5, 1e-5, 7e-4, 0),
+    CorrectedClearance(1, "A", 1e-3, 4e-5, 7e-4, 0, 2, 1.5),
     Commissioned(1, ("hip",), np.zeros(1), np.arange(3.0), np.eye(3)),
     CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80))),
     SimulatedReference(

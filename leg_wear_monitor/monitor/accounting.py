@@ -13,7 +13,6 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarm_specs import CLEARANCE
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config.settings import LedgerFile
-from leg_wear_monitor.monitor.gait_evidence import FRICTION_KEY, SIGMA_KEY
 from leg_wear_monitor.monitor.inputs import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -103,8 +102,6 @@ class Accounting:
         Number of samples skipped because an earlier run modelled their wear, and their time.
     without_zero_s : float
         Time of samples that did not reach the twin, because the crank's zero is not known.
-    commissioned : dict of str to float
-        Values on this leg's torque for the ledger, by names that end in their unit.
     """
 
     def __init__(self, twin: DigitalTwin, ledger: Ledger | None, settings: LedgerFile) -> None:
@@ -129,11 +126,7 @@ class Accounting:
         self._pauses, self._paused_s, self._passed_before_s = 0, 0.0, 0.0
         self._pause_s, self._pause_at_s = 0.0, 0.0  # the last one, and the unmonitored time when it began
         self.without_zero_s = 0.0
-        self.commissioned: dict[str, float] = {}
         if entry:
-            self.commissioned = {
-                name: entry.totals[name] for name in (FRICTION_KEY, SIGMA_KEY) if name in entry.totals
-            }
             self._shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
 
@@ -362,7 +355,6 @@ class Accounting:
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
             totals=self.totals
-            | self.commissioned
             | {_DUE_KEY: self._point_due_s}
             | {
                 clearance_limit_key(alarm.subject): alarm.limit

@@ -9,7 +9,6 @@ import attrs
 from leg_wear_monitor.files import or_nan
 from leg_wear_monitor.monitor.alarms import (
     BIAS,
-    DRIFT,
     EXCHANGED,
     FOOT_LOAD_LIMITS,
     GAPS,
@@ -54,8 +53,8 @@ class AlarmSpec:
     meaning, limit_words : str
         For operators: meaning of the value, by default its noun and unit, and the parameters of its limit.
     value : callable
-        Value from the evidence: a joint's report, the input's health or its guard; from the values of a gait
-        cycle or of its foot load, which are given by kind, the value of this kind.
+        Value from the evidence: a joint's report, the input's health or its guard; by default the value of
+        this kind among the values of a gait cycle, its torque or its foot load, which are given by kind.
     limit : callable
         Limit of ERROR, from the parameters, the RMS of the predicted torque and the number of the joint.
     is_immediate : bool
@@ -93,7 +92,7 @@ class AlarmSpec:
 
     @value.default
     def _by_kind(self) -> Callable[[Any], float]:
-        return lambda values: values.get(self.kind, math.nan)
+        return lambda values: values[self.kind]
 
     def new(self, joint: str = "") -> Alarm:
         """The alarm in its initial state."""
@@ -215,13 +214,6 @@ TORQUE = (
         "predicted RMS",
         limit_words="0.1 of the predicted RMS",
         limit=lambda _, torque_size_nm, *__: 0.1 * torque_size_nm,
-    ),
-    AlarmSpec(
-        kind=DRIFT,
-        unit="N m",
-        quantity="change of the constant drive torque since commissioning",
-        limit_words="0.15 of the predicted RMS",
-        limit=lambda _, torque_size_nm, *__: 0.15 * torque_size_nm,
     ),
     AlarmSpec(
         kind=LAG,

@@ -270,8 +270,8 @@ GAPS, STUCK, ZERO, SCALE, EXCHANGED, SIGN = (
 """Kinds of the alarms of the foot load's sensor; their values have these names."""
 FOOT_LOAD_LIMITS = {GAPS: 0.05, STUCK: 0.9, ZERO: 0.1, SCALE: 3.0, EXCHANGED: 0.5, SIGN: 0.5}
 
-BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
-CAUSES_OF_ALARMS = {BIAS: Cause.BIAS, DRIFT: Cause.FRICTION, LAG: Cause.TIMING}
+BIAS, LAG = "torque_bias", "torque_lag"
+CAUSES_OF_ALARMS = {BIAS: Cause.BIAS, LAG: Cause.TIMING}
 """Causes that have a limit of their own, by the alarm."""
 
 

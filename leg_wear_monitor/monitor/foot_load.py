@@ -121,7 +121,8 @@ class FootLoadCheck(Observer):
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
         """Values of the sensor's alarms by their names."""
         del report
-        return {spec.name(): spec.value(self.values) for spec in alarm_specs.FOOT_LOAD}
+        values = dict.fromkeys(FOOT_LOAD_LIMITS, math.nan) | self.values
+        return {spec.name(): spec.value(values) for spec in alarm_specs.FOOT_LOAD}
 
     def _checked(self, statistics: CycleStatistics) -> dict[str, float]:
         """Add a gait cycle; returns the values of the alarms that can be evaluated."""

@@ -1,21 +1,21 @@
-"""Evidence of gait cycles: fit to this leg, its torque at commissioning and now, torque residuals."""
+"""Evidence of gait cycles: fit to this leg, torque residuals, impossible torques."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
 from leg_wear_monitor.mechanism.position import TURN
-from leg_wear_monitor.monitor.alarms import BIAS, DRIFT, LAG, Alarm
+from leg_wear_monitor.monitor.alarms import BIAS, CAUSES_OF_ALARMS, LAG, Alarm
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.sample import BRIDGE_LIMIT_S, FAULTS, NO_FAULT, Samples
-from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics, NotCompared
+from leg_wear_monitor.twin.statistics import LONGEST, CycleStatistics
 
 # Evidence that the tracked motion is a gait of this leg; without one such cycle, forces are meaningless.
 
@@ -156,63 +156,6 @@ class GaitEvidence:
         return f"the crank turns {turns:.3g} times, but the monitor cannot track a whole gait cycle"
 
 
-# History of a leg's drive torque: its friction at commissioning.
-
-
-COMMISSIONING_CYCLES = 20  # successive cycles as predicted, which give the friction of this leg
-FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
-
-
-class TorqueRecord:
-    """History of a leg's drive torque.
-
-    Parameters
-    ----------
-    totals : dict of str to float
-        Of the ledger.
-
-    Attributes
-    ----------
-    commissioned : NamedCause
-        Constant torque at the commissioning of this leg; NaN before.
-    not_compared : Counter of str
-        Gait cycles whose torque was not compared in this run, by the values of `NotCompared`.
-    """
-
-    def __init__(self, totals: Mapping[str, float]) -> None:
-        value, sigma = (totals.get(key, math.nan) for key in (FRICTION_KEY, SIGMA_KEY))
-        self.commissioned = NamedCause(Cause.FRICTION, value, sigma)
-        self.not_compared = Counter[str]()
-        self._sound = 0  # gait cycles in a row with the torque as predicted, before commissioning
-
-    @property
-    def totals(self) -> dict[str, float]:
-        """Totals for the ledger; empty before commissioning."""
-        known = self.commissioned
-        return {} if math.isnan(known.value) else {FRICTION_KEY: known.value, SIGMA_KEY: known.sigma}
-
-    def add_cycle(self, report: CycleReport, is_sound: bool, not_compared: NotCompared | None) -> None:
-        """Add a gait cycle.
-
-        Parameters
-        ----------
-        report : CycleReport
-        is_sound : bool
-            True if its torque was as predicted.
-        not_compared : NotCompared or None
-            Why it was not compared.
-        """
-        if not report.torque_samples:
-            return
-        if not_compared is not None:
-            self.not_compared[not_compared.value] += 1
-        elif math.isnan(self.commissioned.value):
-            self._sound = self._sound + 1 if is_sound else 0
-            if self._sound >= COMMISSIONING_CYCLES:
-                friction = NamedCause(Cause.FRICTION, report.friction_nm, report.friction_sigma_nm)
-                self.commissioned = friction
-
-
 # The gait cycles since the torque is not as predicted, and their explanation.
 
 
@@ -271,30 +214,23 @@ class MismatchWindow:
                 )  # it stays if the rest becomes less
 
 
-# Checks of the measured torque for an impossible bias, drift or lag: bounds, values, causes.
+# Checks of the measured torque for an impossible bias or lag: bounds, values, causes.
 
 
 _SURE = 3.0  # standard deviations
 
 
-def torque_values(report: CycleReport, record: TorqueRecord, max_friction_nm: float) -> dict[str, float]:
-    """Values of the alarms in their units, 0 unless significant (three sigma); empty without a torque."""
+def torque_values(report: CycleReport, max_friction_nm: float) -> dict[str, float]:
+    """Values of the alarms in their units, 0 unless significant (three sigma); NaN without a torque."""
     if not report.torque_samples:
-        return {}
-    bias, drift = _bias(report, max_friction_nm), _drift(report, record)
+        return dict.fromkeys(CAUSES_OF_ALARMS, math.nan)
     lag = NamedCause(Cause.LAG, report.torque_lag_s, report.torque_lag_sigma_s)
-    return {name: _surely(one) for name, one in ((BIAS, bias), (DRIFT, drift), (LAG, lag))}
+    return {BIAS: _surely(_bias(report, max_friction_nm)), LAG: _surely(lag)}
 
 
-def torque_causes(
-    raised: set[str], report: CycleReport, record: TorqueRecord, max_friction_nm: float
-) -> dict[str, NamedCause]:
+def torque_causes(raised: set[str], report: CycleReport, max_friction_nm: float) -> dict[str, NamedCause]:
     """Cause of each alarm of the torque that is raised."""
-    causes = {
-        BIAS: _bias(report, max_friction_nm),
-        DRIFT: _drift(report, record),
-        LAG: _timing(report),
-    }
+    causes = {BIAS: _bias(report, max_friction_nm), LAG: _timing(report)}
     return {name: one for name, one in causes.items() if name in raised}
 
 
@@ -306,12 +242,6 @@ def _surely(one: NamedCause) -> float:
 
 def _bias(report: CycleReport, max_friction_nm: float) -> NamedCause:
     return beyond_friction(report.friction_nm, report.friction_sigma_nm, max_friction_nm)
-
-
-def _drift(report: CycleReport, record: TorqueRecord) -> NamedCause:
-    known = record.commissioned
-    sigma = math.hypot(report.friction_sigma_nm, known.sigma)
-    return NamedCause(Cause.FRICTION, report.friction_nm - known.value, sigma)
 
 
 def _timing(report: CycleReport) -> NamedCause:

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,6 @@ from leg_wear_monitor.monitor.diagnosis.state import Body, Diagnosis, DiagnosisS
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.gait_evidence import (
     MismatchWindow,
-    TorqueRecord,
     offset_error_rad,
     torque_causes,
     torque_values,
@@ -68,7 +68,6 @@ class TorqueWatch(Observer):
     ----------
     observer : TorqueObserver or None
         Estimates clearances; None if the diagnosis is disabled.
-    record : TorqueRecord
     mismatch : MismatchWindow
     unexplained : str
         Why a torque residual has no explanation; empty if it has one, or if the residual is small.
@@ -76,7 +75,7 @@ class TorqueWatch(Observer):
 
     def __init__(self, leg: WearModel, board: AlarmBoard) -> None:
         self._leg, self._board = leg, board
-        self.record = TorqueRecord(leg.accounting.commissioned)
+        self._not_compared = Counter[str]()  # gait cycles of this run, by the values of `NotCompared`
         self.mismatch = MismatchWindow()
         self.unexplained = ""
         self._made: tuple[TorqueReference, ...] = ()  # simulated references that are in the ledger
@@ -145,20 +144,19 @@ class TorqueWatch(Observer):
             self.observer.ended(statistics, self.is_wrong or is_refused, statistics.load_peak_n)
 
     def alarm_values(self, report: CycleReport) -> Mapping[str, float]:
-        """Torque residual, bias, drift and lag of a gait cycle, by the names of their alarms."""
-        values = torque_values(report, self.record, self._leg.twin.max_friction_nm)
-        if self._leg.config.cadence.allows(report.cadence_rpm):
-            values[MISMATCH.kind] = report.torque_mismatch
+        """Torque residual, bias and lag of a gait cycle, by the names of their alarms."""
+        values = torque_values(report, self._leg.twin.max_friction_nm)
+        is_allowed = self._leg.config.cadence.allows(report.cadence_rpm)
+        values[MISMATCH.kind] = report.torque_mismatch if is_allowed else math.nan
         return {spec.name(): spec.value(values) for spec in TORQUE}
 
     def judge(self, statistics: CycleStatistics, report: CycleReport) -> None:
-        """Look for causes of a torque residual, and record a torque that is as predicted."""
+        """Look for causes of a torque residual, and count gait cycles whose torque was not compared."""
         self._explain(statistics)
         is_allowed = self._leg.config.cadence.allows(statistics.cadence_rpm)
         why = statistics.not_compared if is_allowed else NotCompared.CADENCE
-        is_sound = report.torque_mismatch < self._allowed.unexplained
-        self.record.add_cycle(report, is_sound, why)
-        self._leg.accounting.commissioned = self.record.totals
+        if report.torque_samples and why is not None:
+            self._not_compared[why.value] += 1
 
     def _explain(self, statistics: CycleStatistics) -> None:
         """Look for causes of a torque residual; a wrong torque says nothing about the leg."""
@@ -329,7 +327,7 @@ class TorqueWatch(Observer):
         """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
         alarms, last = self._board.alarms, self._leg.last
         present = {name for name in _TORQUE if alarms[name].present is not Level.OK}
-        return torque_causes(present, last, self.record, self._leg.twin.max_friction_nm) if last else {}
+        return torque_causes(present, last, self._leg.twin.max_friction_nm) if last else {}
 
     @property
     def leg_fields(self) -> Mapping[str, Any]:
@@ -394,12 +392,11 @@ class TorqueWatch(Observer):
             "residual_rms_nm": last.residual_torque_rms_nm,
             "mismatch": last.torque_mismatch,
             "samples": float(last.torque_samples),
-            "friction_commissioned_nm": self.record.commissioned.value,
             "crank_offset_error_rad": offset_error_rad(last),
             **{name: getattr(last, name) for name in _SAME_NAMES},
         }
         for why in NotCompared:
-            values[f"not_compared_{why.value}_cycles"] = float(self.record.not_compared[why.value])
+            values[f"not_compared_{why.value}_cycles"] = float(self._not_compared[why.value])
         raised = {name for name in _TORQUE if alarms[name].level is not Level.OK}
         messages = []
         if MISMATCH.name() in raised:

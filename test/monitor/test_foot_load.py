@@ -1,7 +1,9 @@
 """The sensor of the foot load: what it shows of a leg in full coordinates, and each of its faults by name."""
 
+import math
 from collections.abc import Callable
 
+import attrs
 import numpy as np
 import pytest
 from readings_as_samples import samples
@@ -14,6 +16,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.person import nominal_stance
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
+from leg_wear_monitor.monitor.alarm_specs import DEPARTURE, KINDS
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.verdict.verdict import rules
 from leg_wear_monitor.state import Level
@@ -70,6 +73,17 @@ def test_a_healthy_leg_on_the_ground_is_healthy(walk):
     assert 0.0 < load.peak_sigma_n < 0.4 * PEAK_N
     status = status_of(monitor, "foot_load")
     assert status.level is Level.OK and status.values["peak_n"] == load.peak_n
+
+
+def test_every_alarm_has_a_value_in_a_replay_that_has_its_signal(walk):
+    """Encoders are not in this walk: `test_encoders.py` raises their alarm."""
+    leg = lw.load_mechanism("bionic_leg")
+    limited = attrs.evolve(leg.clearances["A"], material="du-on-steel-dry")
+    leg = attrs.evolve(leg, clearances=leg.clearances | {"A": limited})
+    monitor = lw.WearMonitor(leg, config_from(MEASURED))
+    monitor.update(walk)
+    with_value = {alarm.kind for alarm in monitor.alarms.alarms if math.isfinite(alarm.value)}
+    assert with_value == KINDS.keys() - {DEPARTURE.kind}
 
 
 def test_without_the_sensor_the_torque_shows_a_stance_and_no_mismatch(walk):

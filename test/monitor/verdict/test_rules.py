@@ -202,7 +202,6 @@ CASES = [
     (BOTH | {"explained": explained(Cause.LOAD)}, INSPECT, "CLEARANCE_CHANGED_G", ALL),
     (OPENED | {"explained": explained(Cause.TIMING)}, INSPECT, "CLEARANCE_CHANGED_G", ALL),
     (raised("torque_bias"), INSPECT, "TORQUE_BIAS", ()),
-    (raised("torque_drift"), INSPECT, "FRICTION_CHANGED", ()),
     (raised("torque_lag"), INSPECT, "TORQUE_TIMING", ()),
     (raised("torque_lag", present=Level.OK), INSPECT, "TORQUE_TIMING", ()),  # latched
     (raised("torque_lag", Level.WARN), WATCH, "ALARM", ()),
@@ -300,7 +299,6 @@ SAME = [
     (Cause.TIMING, {"value": -0.05}, "torque_lag"),
     (Cause.LOAD, {"value": -40.0}, None),
     (Cause.MASS, {"value": 0.5, "subject": "shank"}, None),
-    (Cause.FRICTION, {"value": 2.0}, "torque_drift"),
 ]
 
 

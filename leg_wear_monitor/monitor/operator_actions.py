@@ -221,7 +221,7 @@ class OperatorActions:
             leg.worn_m(leg.twin.clearance_mean_m),
             leg.evaluation.board.clearance_limits_m,
             leg.is_forecast_valid(leg.verdict_report().findings),
-            leg.model_error,
+            leg.load_sigma,
         )
         leg.last = with_forecast(last, forecast, leg.measured)
         return leg.last

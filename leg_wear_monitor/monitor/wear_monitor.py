@@ -114,7 +114,6 @@ class WearMonitor(OperatorActions):
         self._twin.warm_up()
         for observer in self._leg.observers:
             observer.warm_up()
-        _ = self._leg.model_error  # this takes a quarter of a second
 
     def go_live(self) -> None:
         """Keep up with samples as they are taken: never wait for a reference that threads simulate.
@@ -200,7 +199,7 @@ class WearMonitor(OperatorActions):
             leg.worn_m(statistics.clearance_mean_m),  # the twin itself may be ahead
             self.clearance_limits_m,
             lambda: leg.is_forecast_valid(leg.findings),
-            leg.model_error,
+            leg.load_sigma,
         )
         seen = leg.encoders.estimates if leg.encoders else None
         leg.last = report = leg.report(statistics, forecast, seen, list(map(surest, leg.seen)))

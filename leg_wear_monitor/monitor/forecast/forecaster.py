@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 from leg_wear_monitor.monitor.alarms import WARN_FRACTION
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
-from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, GrowthRate, ModelError, growth_rate
+from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, GrowthRate, growth_rate
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     ClearanceAtWear,
     CoefficientEstimate,
@@ -245,7 +245,7 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
-        model: ModelError,
+        load_sigma: float,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -258,8 +258,8 @@ class Forecaster:
             Of the mean clearances.
         is_valid : callable
             True if the leg is in the range of the model.
-        model : ModelError
-            Error of the growth because of the load.
+        load_sigma : float
+            Standard deviation of an estimated load, as a fraction of it; growth is at most in proportion.
         """
         longest, moving_s = self._settings.window_cycles, statistics.moving_s
         self._cycles = tuple(
@@ -269,7 +269,7 @@ class Forecaster:
         is_recent = 0 <= statistics.stamp_ns - self._stamp_ns < RENEWED_NS
         if self._last is None or not is_recent or _known(self._rates) > self._known:
             self._stamp_ns = statistics.stamp_ns
-            return self.renewed(wear_m, limits_m, is_valid(), model)
+            return self.renewed(wear_m, limits_m, is_valid(), load_sigma)
         return self._last
 
     def renewed(
@@ -277,7 +277,7 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: bool,
-        model: ModelError,
+        load_sigma: float,
     ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
         rates = self._rates
@@ -289,7 +289,7 @@ class Forecaster:
                 wear_m=float(wear_m[k]),
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
-                growth_error_m=rate.error_m(model.by_load(k, rate.per_cycle_m)) if rate else 0.0,
+                growth_error_m=rate.error_m(load_sigma) if rate else 0.0,
                 has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))

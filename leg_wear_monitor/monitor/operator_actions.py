@@ -153,7 +153,6 @@ class OperatorActions:
             sigma_m=float(sigma_m),
             stamp_ns=stamp_ns,
             who=who,
-            kept_ns=accounting.ledger.kept_ns if accounting.ledger else 0,
             accept=accept,
             limit_m=leg.evaluation.board.clearance_limits_m[leg.clearance_joints.index(joint)],
         )

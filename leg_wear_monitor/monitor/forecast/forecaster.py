@@ -11,8 +11,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.estimate.cause import SURE_SIGMAS
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import measured_fault, sigma_fault
-from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
-from leg_wear_monitor.monitor.alarms import WARN_FRACTION
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth import GROWTH_CYCLES, GrowthRate, growth_rate
@@ -27,28 +26,7 @@ from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear,
 from leg_wear_monitor.monitor.verdict.verdict import table
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
-# Accuracy of past forecasts: the ledger has the expected value of each measured clearance.
-
-
-LEAST = 5  # measurements, below which fractions have no meaning
-
-
-def validity(measurements: Sequence[Measurement]) -> str:
-    """Agreement of measurements with the forecasts before each of them, in a line for operators.
-
-    Measurements that contradict the model count as well, and withdrawn measurements do not. In the long run
-    80 % are between the p10 and the p90 of the expected clearance.
-    """
-    below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
-    within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
-    text = f"{within} of {len(below)} measured clearances were between expected p10 and p90"
-    if len(below) < LEAST:
-        return f"{text}; too few to evaluate the forecast"
-    bias = float(below.mean() - 0.5)  # above 0, joints wear faster than forecast
-    # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
-    if abs(bias) * np.sqrt(12.0 * len(below)) < 2.0:
-        return f"{text}; no bias found"
-    return f"{text}; joints wear {'faster' if bias > 0.0 else 'slower'} than forecast"
+# The meaning of a measured clearance.
 
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
@@ -57,9 +35,6 @@ AT_LIMIT, CONTRADICTS_MODEL, NOT_STORED = "AT_LIMIT", "CONTRADICTS_MODEL", "NOT_
 """Codes that begin a service's reply in brackets if the operator has to act: ``[AT_LIMIT] A: …``."""
 
 _SAYS_SOMETHING = 0.9  # a measurement is informative if it leaves at most this fraction of the spread
-
-
-_MOST_PER_PA: float = attrs.fields_dict(Clearance)["wear_coefficient"].metadata["usual"][1]
 
 
 @attrs.frozen(eq=False, kw_only=True)
@@ -76,12 +51,6 @@ class MeasurementResult:
         True if the model holds it next to impossible.
     modelled_m : float
         Clearance that the twin had modelled for this part.
-    nominal_per_pa : float
-        Nominal wear coefficient of the joint's softer surface.
-    clock_late_s : float
-        Time from the measurement to the last entry of the ledger, which should be before it.
-    earlier : sequence of Measurement
-        All of the ledger, without this one.
     shown_m, shown_sigma_m, shown_by : float, float, str
         Estimate of the joint by encoders or the drive torque before, with its source in words; NaN and empty
         without an estimate.
@@ -96,9 +65,6 @@ class MeasurementResult:
     after: CoefficientEstimate
     contradicts: bool
     modelled_m: float
-    nominal_per_pa: float
-    clock_late_s: float
-    earlier: Sequence[Measurement]
     shown_m: float = math.nan
     shown_sigma_m: float = math.nan
     shown_by: str = ""
@@ -114,43 +80,27 @@ class MeasurementResult:
     @property
     def findings(self) -> tuple[str, ...]:
         """Names of the sentences on this measurement in the table of the verdict."""
-        now, limit_m, found = self.measurement, self.limit_m, ["measured", "modelled"]
-        if now.clearance_m >= limit_m:
-            found.append("at_limit")
-        elif now.clearance_m >= WARN_FRACTION * limit_m:
-            found.append("near_limit")
+        now, found = self.measurement, ["measured", "modelled"]
+        found += ["at_limit"] if now.clearance_m >= self.limit_m else []
         found += [self.eased] if self.eased else []
         if self.agrees:
             found.append("agrees")
         elif math.isfinite(self.shown_m + self.shown_sigma_m):
-            is_ended = now.clearance_m + SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m
-            found.append("differs_and_ends" if is_ended else "differs")
-        if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
-            return (*found, *(("not_by_wear", self._change) if now.counts else ("not_by_wear_unused",)))
-        found += ["late_clock"] if self.clock_late_s > 0.0 else []
-        if self.contradicts:
-            found += ["accepted", "again"] if now.counts else ["not_accepted", "again_or_accept"]
-        return (*found, self._change)
-
-    @property
-    def _change(self) -> str:
-        """Name of the sentence on the wear coefficient."""
-        if self.after.observations == self.before.observations:
-            return "unchanged"
-        if self.after.sigma > _SAYS_SOMETHING * self.before.sigma:
-            return "adds_little"
-        is_doubted = self.contradicts and self._factors[1] * self.nominal_per_pa > _MOST_PER_PA
-        return "coefficient_doubted" if is_doubted else "coefficient"
-
-    @property
-    def _factors(self) -> list[float]:
-        """The joint's wear coefficient over the nominal one: p10, p50, p90."""
-        return list(np.exp(self.after.log_factors((0.1, 0.5, 0.9))).tolist())
+            found.append("differs")
+        if self.contradicts and self.agrees:  # the modelled wear is wrong, not the measurement
+            found.append("not_by_wear")
+        elif self.contradicts:
+            found.append("accepted" if now.counts else "not_accepted")
+        if now.counts:
+            is_informative = self.after.sigma <= _SAYS_SOMETHING * self.before.sigma
+            found.append("coefficient" if is_informative else "adds_little")
+        return tuple(found)
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The measurement and its effects for operators, one line each."""
-        now, (low, middle, high), texts = self.measurement, self._factors, table().measurement
+        now, texts = self.measurement, table().measurement
+        low, middle, high = np.exp(self.after.log_factors((0.1, 0.5, 0.9))).tolist()
         words = {
             "joint": now.joint,
             "size": f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}",
@@ -159,14 +109,11 @@ class MeasurementResult:
             "limit": _mm(self.limit_m),
             "by": self.shown_by,
             "shown": f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}",
-            "hours": f"{self.clock_late_s / 3600.0:.3g}",
             "more": "larger" if now.expected_below > 0.5 else "smaller",
             "factors": f"{middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90)",
             "narrower": f"{self.before.sigma / self.after.sigma:.3g}",
-            "per_pa": f"{middle * self.nominal_per_pa:.2g} 1/Pa, usually below {_MOST_PER_PA:g} 1/Pa",
         }
-        lines = (texts[name].format(**words) for name in self.findings)
-        return (*lines, validity([*self.earlier, now]))
+        return tuple(texts[name].format(**words) for name in self.findings)
 
     @property
     def codes(self) -> list[str]:
@@ -377,7 +324,6 @@ class Forecaster:
         sigma_m: float,
         stamp_ns: int,
         who: str,
-        kept_ns: int = 0,
         accept: bool = False,
         limit_m: float = math.nan,
     ) -> MeasurementResult:
@@ -392,8 +338,6 @@ class Forecaster:
         stamp_ns : int
             By the clock.
         who : str
-        kept_ns : int
-            Stamp of the ledger's last entry, 0 if there is none.
         accept : bool
             True if it counts even if it contradicts the model.
         limit_m : float
@@ -427,7 +371,7 @@ class Forecaster:
             expected_below=below,
             counts=accept or not contradicts,
         )
-        earlier, self.measurements = self.measurements, (*self.measurements, new)
+        self.measurements = (*self.measurements, new)
         self.estimate_anew(joint, wear.replaced_ns)
         return MeasurementResult(
             measurement=new,
@@ -435,9 +379,6 @@ class Forecaster:
             after=self.coefficient_estimates[k],
             contradicts=contradicts,
             modelled_m=fresh_m + wear.mean_m,
-            nominal_per_pa=max(self._clearances[k].wear_coefficient),
-            clock_late_s=1.0e-9 * (kept_ns - stamp_ns) if kept_ns else 0.0,
-            earlier=earlier,
             limit_m=limit_m,
         )
 

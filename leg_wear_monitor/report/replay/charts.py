@@ -1,6 +1,5 @@
 """Charts of a replay: joints and input over time, forecast, wear around each bushing."""
 
-import math
 from collections.abc import Sequence
 
 import attrs
@@ -8,8 +7,6 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast, bases, three_digits
-from leg_wear_monitor.monitor.forecast.forecaster import validity
-from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.recordings.result import ReplaySummary, WornDepth
 from leg_wear_monitor.report.figure import length_unit, time_of
 from leg_wear_monitor.report.page import (
@@ -192,11 +189,10 @@ def joint_section(summary: ReplaySummary) -> Section:
     return Section("Joints over time", parts, is_folded=True)
 
 
-# The forecast: how long each joint and the leg last, and how past forecasts did.
+# The forecast: how long each joint and the leg last.
 
 
 FRACTIONS = ("p10", "p50", "p90")
-_MEASURED = ((True, "measured", "--series-0"), (False, "contradicts, not used", "--bad"))
 
 
 def forecast_section(summary: ReplaySummary) -> Section:
@@ -209,10 +205,8 @@ def forecast_section(summary: ReplaySummary) -> Section:
             {summary.leg.joint_words(name): forecast for name, forecast in _forecasts(summary)}
         )
     ]
-    if summary.measurements:
-        parts.append(_validity(summary.measurements))
-    else:
-        parts.append(Text("No clearance was measured yet; one measurement makes the forecast much narrower."))
+    if not summary.measurements:
+        parts.append(Text("No clearance was measured yet; one measurement makes the forecast narrower."))
     return Section("Forecast", parts, is_folded=True)
 
 
@@ -250,33 +244,6 @@ def _forecasts(summary: ReplaySummary) -> list[tuple[str, JointForecast]]:
 def _lasts(forecast: JointForecast | LegForecast) -> list[str]:
     hours = forecast.hours
     return [three_digits(getattr(hours, fraction)) if hours else "-" for fraction in FRACTIONS]
-
-
-def _validity(measurements: Sequence[Measurement]) -> Chart:
-    """Each measured clearance in the distribution that was predicted before it."""
-    kept = sorted((each for each in measurements if not each.is_withdrawn), key=lambda each: each.cycles)
-    series = []
-    for joint in dict.fromkeys(each.joint for each in kept):
-        for counts, words, colour in _MEASURED:
-            is_one = [each.joint == joint and each.counts is counts for each in kept]
-            below = np.where(is_one, [each.expected_below for each in kept], math.nan)
-            if any(is_one):
-                name = f"{words}: {joint}"  # a name that starts with = would be a formula in a spreadsheet
-                series.append(Series(name, "", below, colour, "points"))
-    for name, end in (("p10", 0.1), ("p90", 0.9)):
-        values = np.full(len(kept), end)
-        series.append(Series(name, "", values, "--ink", "dashed"))
-    title = "Predicted probability of a smaller clearance"
-    cycles = np.array([float(each.cycles) for each in kept])
-    return Chart(
-        name="measurements",
-        alt="Each measured clearance in its predicted distribution",
-        caption=f"{validity(measurements)}. In the long run 80 % lie between p10 and p90.",
-        x=Series("gait cycles of the part", "", cycles),
-        ends=(0.0, max(1.05 * float(cycles.max(initial=0.0)), 1.0)),
-        panels=[Panel(title, series, low=-0.02, high=1.02, height=240)],
-        group="measurements",
-    )
 
 
 # Wear around each bushing and journal, on an axis that shows its true size.

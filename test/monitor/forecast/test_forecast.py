@@ -231,7 +231,7 @@ def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
         low, middle, high = np.exp(result.after.log_factors((0.1, 0.5, 0.9)))
         assert middle == pytest.approx(factor, rel=0.5 if factor < 100.0 else 0.05)
         assert 0.0 < low < middle < high
-        assert f"{middle:.3g} times the nominal one" in result.lines[-2]
+        assert f"{middle:.3g} times the nominal one" in result.lines[-1]
     else:  # next to no wear where the twin has counted much
         assert np.exp(result.after.log_factors(0.9)) < 0.2
 
@@ -285,23 +285,14 @@ def test_a_measurement_says_what_it_taught():
 def test_a_contradiction_is_said_and_kept_but_does_not_count():
     result = found(worn(1e-5), 0.9)
     assert (result.contradicts, result.measurement.counts) == (True, False)
-    assert result.findings == ("measured", "modelled", "not_accepted", "again_or_accept", "unchanged")
+    assert result.findings == ("measured", "modelled", "not_accepted")
     assert result.after.observations == 0
     # and the next one is judged as if it had not been
     assert not found(worn(1e-5), 0.31, [result.measurement]).contradicts
     asked_for = found(worn(1e-5), 0.9, accept=True)
     assert (asked_for.measurement.counts, asked_for.after.observations) == (True, 1)
     assert asked_for.after.mean > 1.0
-    assert asked_for.findings[2:4] == ("accepted", "again")
-
-
-def test_an_accepted_measurement_that_no_wear_explains_is_doubted():
-    """Also where the drive torque shows it: it explains the clearance, not the coefficient."""
-    result = found(worn(5e-11), 0.63, accept=True)
-    assert result.findings[-1] == "coefficient_doubted"
-    shown = attrs.evolve(result, shown_m=0.6e-3, shown_sigma_m=0.05e-3, shown_by="the drive torque")
-    assert attrs.evolve(shown, limit_m=1e-3).findings[-1] == "coefficient_doubted"
-    assert found(worn(1e-6), 0.33, accept=True).findings[-1] != "coefficient_doubted"
+    assert asked_for.findings[2] == "accepted"
 
 
 def test_a_clearance_smaller_than_when_new_contradicts_too():
@@ -333,12 +324,6 @@ def test_a_changed_coefficient_keeps_the_clearance_and_what_was_measured(is_meas
         assert now == pytest.approx(then, rel=1e-3)
     again = Forecaster(LEG, PRIOR, earlier, replaced_ns, [correction]).coefficient_estimates[0]
     np.testing.assert_array_equal(again.weight, after.weight)
-
-
-def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
-    early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
-    assert (early.clock_late_s, early.findings[2], right.findings[2]) == (7200.0, "late_clock", "coefficient")
-    np.testing.assert_array_equal(early.after.weight, right.after.weight)
 
 
 @given(st.floats(0.02, 3.0), st.floats(-1.0, 60.0), st.floats(0.1, 10.0))

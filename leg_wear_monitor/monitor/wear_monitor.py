@@ -245,11 +245,6 @@ class WearMonitor(OperatorActions):
         self._accounting.pause(pause_s)
 
     @property
-    def due_stamp_ns(self) -> int:
-        """Stamp that the samples of all kinds must reach for the next reports; 0 if it is not known."""
-        return self._twin.due_stamp_ns
-
-    @property
     def alarms(self) -> AlarmList:
         """State of all alarms."""
         return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._board.alarms.values()))

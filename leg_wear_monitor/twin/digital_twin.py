@@ -215,11 +215,6 @@ class DigitalTwin:
         return float(self._tracker.state.node.speed)
 
     @property
-    def due_stamp_ns(self) -> int:
-        """Stamp that the samples of all kinds must reach for the next values; 0 if it is not known."""
-        return self._tracker.due_stamp_ns
-
-    @property
     def intake(self) -> Intake:
         """Counts of samples and times since the twin was created."""
         if self._intake is None:  # needed several times between two updates

@@ -14,9 +14,9 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.materials import USUAL_SPREAD
 from leg_wear_monitor.monitor.config.settings import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, cycles_to, forecast
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import (
+from leg_wear_monitor.monitor.forecast.forecaster import (
     LEAST_CYCLES,
+    Forecaster,
     GrowthRate,
     growth_rate,
 )

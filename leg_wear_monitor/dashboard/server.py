@@ -2,22 +2,19 @@
 
 import asyncio
 import ipaddress
-import re
-import resource
 import socket
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import Any
+from urllib.parse import urlsplit
 
 import attrs
 from tornado.httpserver import HTTPServer
-from tornado.iostream import IOStream, StreamClosedError
+from tornado.iostream import StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
 from leg_wear_monitor.dashboard.hub import Hub
 from leg_wear_monitor.errors import LegWearError, printable
-
-MOST_CONNECTIONS = 300  # connections: the viewers of a hub, and further connections of their browsers
 
 _WRITE_S = 20.0  # a viewer that reads nothing for this time is disconnected
 _IDLE_S = 20.0  # a connection without a whole request for this time is closed; the browser opens a new one
@@ -103,7 +100,7 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
         Called once the page can be loaded.
     """
     ended = asyncio.Event()
-    server = _Server(
+    server = HTTPServer(
         application(hub, place.host),
         idle_connection_timeout=_IDLE_S,
         body_timeout=_IDLE_S,
@@ -122,24 +119,6 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
         await renewing  # raises the error that ended it, if any
         await server.close_all_connections()
         hub.finish()
-
-
-class _Server(HTTPServer):
-    """A server that closes surplus connections, long before file descriptors run out."""
-
-    _open = 0
-
-    def handle_stream(self, stream: IOStream, address: tuple[Any, ...]) -> None:
-        descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-        if self._open >= min(MOST_CONNECTIONS, descriptors // 2):
-            stream.close()
-            return
-        self._open += 1
-        super().handle_stream(stream, address)
-
-    def on_close(self, server_conn: object) -> None:
-        self._open -= 1
-        super().on_close(server_conn)
 
 
 def application(hub: Hub, host: str) -> Application:
@@ -170,7 +149,7 @@ class _Reading(RequestHandler):
             self.set_header(name, value)
 
     def prepare(self) -> None:
-        if not is_allowed(self.request.headers.get("Host", ""), self._host, own_names(self._host)):
+        if not is_allowed(self.request.headers.get("Host", ""), self._host):
             raise HTTPError(HTTPStatus.FORBIDDEN)
         if self.request.headers.get("Sec-Fetch-Site") == "cross-site" and not self._is_navigation:
             raise HTTPError(HTTPStatus.FORBIDDEN)
@@ -248,40 +227,21 @@ class _Nothing(_Reading):
 # server's answers. An address cannot be misused like this, and neither can this machine's own names.
 
 
-_HOST = re.compile(r"\[(?P<six>[0-9a-fA-F:.]+)\](:\d{1,5})?|(?P<name>[A-Za-z0-9._-]{1,253}?)\.?(:\d{1,5})?")
-
-
 def is_local(host: str) -> bool:
     """True if a server bound to a host can be reached from this machine only."""
     return host == "localhost" or _is_loopback(host)
 
 
-def own_names(host: str) -> frozenset[str]:
-    """Names that a request may use, in addition to addresses, if a server is bound to a host."""
-    if is_local(host):
-        return frozenset({"localhost"})
-    own = {"localhost", host.lower(), socket.gethostname().lower(), f"{socket.gethostname().lower()}.local"}
-    return frozenset(own)
-
-
-def is_allowed(header: str, host: str, names: frozenset[str]) -> bool:
-    """True if the Host header of a request names this server.
-
-    Parameters
-    ----------
-    header : str
-    host : str
-        Host name or address that the server is bound to.
-    names : frozenset of str
-        Names returned by `own_names`.
-    """
-    found = _HOST.fullmatch(header)
-    if found is None:
+def is_allowed(header: str, host: str) -> bool:
+    """True if the Host header of a request names this server, which is bound to a host."""
+    try:
+        asked = (urlsplit(f"//{header}").hostname or "").rstrip(".")
+    except ValueError:
         return False
-    asked = (found["six"] or found["name"]).lower()
-    if asked in names:
-        return True
-    return _is_loopback(asked) if is_local(host) else _is_address(asked)
+    if is_local(host):
+        return asked == "localhost" or _is_loopback(asked)
+    own = socket.gethostname().lower()
+    return asked in {"localhost", host.lower(), own, f"{own}.local"} or _is_address(asked)
 
 
 def _is_address(text: str) -> bool:

@@ -78,4 +78,3 @@ def walk(leg, second=1, clearance_m=3.1e-4):
             status("input", "in order"),
         ],
     )
-    leg.take_peaks(dict.fromkeys("ABGIJ", 9.0))

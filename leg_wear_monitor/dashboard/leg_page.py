@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping, Sequence
 
 import attrs
-import numpy as np
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.files import share_directory
@@ -37,7 +36,7 @@ from leg_wear_monitor.report.page import (
     render,
     verdict_banner,
 )
-from leg_wear_monitor.report.replay.charts import health_chart, joint_trends
+from leg_wear_monitor.report.replay.charts import joint_trends
 from leg_wear_monitor.report.replay.joints import joints_and_leg
 from leg_wear_monitor.report.replay.page import belief, raised_alarms
 from leg_wear_monitor.state import LegState, State, Verdict
@@ -246,7 +245,7 @@ def leg_content(now: ReplaySummary, node: str, freshness: Freshness, instead: st
 
 
 def trends_markup(now: ReplaySummary) -> str:
-    """Charts of the joint that the reader chooses; the charts of input and torque are folded."""
+    """Charts of the clearance of the joint that the reader chooses."""
     stamps = now.history.stamp_ns
     if len(stamps) < 2:
         return parts_markup([Text("There is nothing to draw yet.")])
@@ -255,8 +254,7 @@ def trends_markup(now: ReplaySummary) -> str:
     timed = attrs.evolve(now, recording=times)
     named = sorted(now.monitor.clearance_joints, key=lambda joint: joint not in now.verdict.joints)
     joints = [(joint, now.leg.joint_words(joint), joint_trends(timed, joint)) for joint in named]
-    leg = [health_chart(timed)] if np.isfinite(timed.history.cadence_rpm).any() else []
-    return render("dashboard/trends.html", joints=joints, leg=leg)
+    return render("dashboard/trends.html", joints=joints)
 
 
 def parts_markup(parts: Sequence[Part]) -> str:

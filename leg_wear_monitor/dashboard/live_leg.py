@@ -22,8 +22,7 @@ from leg_wear_monitor.dashboard.leg_page import (
     unknown_leg,
 )
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.files import finite_or_none, number_of, or_nan, received_json
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.files import number_of, or_nan, received_json
 from leg_wear_monitor.recordings.result import ReplayHistory, ReplayStatus, ReplaySummary
 from leg_wear_monitor.recordings.summary import CYCLE_COLUMNS, SEEN_COLUMNS, SUMMARY_COLUMNS
 from leg_wear_monitor.state import SCHEMA_VERSION, LegState, Level
@@ -94,26 +93,9 @@ def _clean(part: Any) -> Any:
     return None if is_huge else part
 
 
-_ROWS = 1200  # rows of the trends: twenty minutes at one report per second
+_STATES = 1200  # in the trends: twenty minutes at one gait cycle per second
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
 _TRENDS_S = 5.0  # charts are many kilobytes, so the page does not send them with each message
-_GAIT = {"cycle": "cycles", "cadence_rpm": "cadence_rpm"}
-_TORQUE = {
-    "measured_torque_rms_nm": "measured_rms_nm",
-    "predicted_torque_rms_nm": "predicted_rms_nm",
-    "torque_mismatch": "mismatch",
-    "load_n": "load_n",
-    "friction_nm": "friction_nm",
-}
-
-
-@attrs.frozen
-class Row:
-    """Values at a stamp, by column, or by column and joint; a value that is absent is not known."""
-
-    stamp_ns: int
-    leg: Mapping[str, float | None]
-    joints: Mapping[str, Mapping[str, float | None]]
 
 
 class LiveLeg:
@@ -138,8 +120,7 @@ class LiveLeg:
         self._state, self._fault = NOTHING_KNOWN, ""
         self._statuses: dict[str, ReplayStatus] = {}
         self._leg_silent_s: float | None = None
-        self._peaks_n: dict[str, float | None] = {}
-        self._rows: deque[Row] = deque(maxlen=_ROWS)
+        self._past: deque[LegState] = deque(maxlen=_STATES)
         self._arrived_s: float | None = None
         self._is_new = True
         self._trends: tuple[float, str] = (-math.inf, "")
@@ -159,9 +140,6 @@ class LiveLeg:
             verdict = own.pop("verdict", None)
             self._leg_silent_s = verdict.values.get(_NO_DATA) if verdict else None
             self._statuses = own
-            if self._rows and stamp_ns < self._rows[-1].stamp_ns:  # a different time base
-                self._rows.clear()
-            self._rows.append(self._row(stamp_ns))
 
     def take_state(self, text: str) -> None:
         """A message of ``~/state``; the page reports a message that it cannot read."""
@@ -172,29 +150,13 @@ class LiveLeg:
         with self._lock:
             self._note_arrival()
             self._state, self._fault = state, fault
-
-    def take_peaks(self, peaks_n: Mapping[str, float]) -> None:
-        """A message of ``~/clearance_states``: the largest contact force of each joint in a gait cycle."""
-        first = islice(peaks_n.items(), MOST)
-        with self._lock:
-            self._note_arrival()
-            self._peaks_n = {printable(joint): finite_or_none(peak_n) for joint, peak_n in first}
+            if self._past and state.stamp_ns < self._past[-1].stamp_ns:  # a different time base
+                self._past.clear()
+            if not fault:
+                self._past.append(state)
 
     def _note_arrival(self) -> None:
         self._arrived_s, self._is_new = self._clock(), True
-
-    def _row(self, stamp_ns: int) -> Row:
-        leg: dict[str, float | None] = {}
-        for status, columns in (("gait", _GAIT), ("torque", _TORQUE)):
-            if status in self._statuses:
-                values = self._statuses[status].values
-                leg |= {column: values.get(name) for column, name in columns.items()}
-        joints = self._state.clearances
-        columns_m = {
-            name: {joint: getattr(each, name) for joint, each in joints.items()}
-            for name in ("modelled_m", *SEEN_COLUMNS)
-        }
-        return Row(stamp_ns, leg, {**columns_m, "peak_force_n": self._peaks_n})
 
     def has_news(self) -> bool:
         """True if messages have come since the last content."""
@@ -235,19 +197,17 @@ class LiveLeg:
     def _now(self) -> ReplaySummary:
         setup, gait = self._setup or unknown_leg(), self._statuses.get("gait")
         missing = "" if self._state.life_cycles else gait.message if gait else "no message was received"
-        history = _history(self._rows, setup.monitor.clearance_joints)
+        history = _history(self._past, setup.monitor.clearance_joints)
         return summary_of_now(setup, self._state, history, list(self._statuses.values()), missing)
 
 
-def _history(rows: Sequence[Row], joints: Sequence[str]) -> ReplayHistory:
-    """The rows as columns; a column that was never received is all NaN."""
-    columns: dict[str, Any] = {name: _column(row.leg.get(name) for row in rows) for name in CYCLE_COLUMNS}
-    columns |= {
-        name: {joint: _column(row.joints.get(name, {}).get(joint) for row in rows) for joint in joints}
-        for name in SUMMARY_COLUMNS.values()
-    }
-    return ReplayHistory(stamp_ns=np.array([row.stamp_ns for row in rows], np.int64), **columns)
-
-
-def _column(values: Iterable[float | None]) -> Floats:
-    return np.array([or_nan(value) for value in values], float)
+def _history(states: Sequence[LegState], joints: Sequence[str]) -> ReplayHistory:
+    """Clearances of past states as columns; the columns of gait cycles are not known."""
+    columns: dict[str, Any] = dict.fromkeys(CYCLE_COLUMNS, np.full(len(states), math.nan))
+    columns |= {name: {} for name in SUMMARY_COLUMNS.values()}
+    for name in ("modelled_m", *SEEN_COLUMNS):
+        columns[name] = {
+            joint: np.array([or_nan(getattr(one.clearances.get(joint), name, None)) for one in states], float)
+            for joint in joints
+        }
+    return ReplayHistory(stamp_ns=np.array([one.stamp_ns for one in states], np.int64), **columns)

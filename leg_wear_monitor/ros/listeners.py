@@ -18,7 +18,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from leg_wear_monitor.dashboard.leg_page import LegSetup, leg_setup
@@ -35,7 +34,7 @@ from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
 
 
 _ASK_AGAIN_S = 2.0
-_HEARD = (outputs.STATE, outputs.DIAGNOSTICS, outputs.CLEARANCES)
+_HEARD = (outputs.STATE, outputs.DIAGNOSTICS)
 
 
 def full_name(node: str) -> str:
@@ -105,7 +104,6 @@ class _Listener(Node):
         )
         self._monitor, self._leg = monitor, leg
         self._subscribe(outputs.STATE, String, lambda m: leg.take_state(m.data))
-        self._subscribe(outputs.CLEARANCES, JointState, lambda m: leg.take_peaks(_peaks_n(m)))
         self._subscribe(
             outputs.DIAGNOSTICS,
             DiagnosticArray,
@@ -178,11 +176,6 @@ def _statuses(message: DiagnosticArray) -> Iterable[ReplayStatus]:
     for status in first:
         values = {pair.key: pair.value for pair in status.values[:MOST]}
         yield received_status(status.name, ord(status.level), status.message, values)
-
-
-def _peaks_n(message: JointState) -> dict[str, float]:
-    names = [name.removesuffix("_clearance") for name in message.name]
-    return dict(zip(names, message.effort, strict=False))
 
 
 # Listener of the demo: prints the state of the leg after each gait cycle.

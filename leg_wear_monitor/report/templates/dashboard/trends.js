@@ -1,15 +1,13 @@
 "use strict";
-// Shows the trends of the joint that is chosen; the choice, and what is unfolded, outlast new data.
+// Shows the trends of the joint that is chosen; the choice outlasts new data.
 (function () {
-  let chosen = null, isOpen = false;
+  let chosen = null;
 
   function show() {
     const region = document.querySelector('[data-region="trends"]'), select = region && region.querySelector("select.joint");
     if (!select) return;
     if (chosen !== null && Array.from(select.options).some((option) => option.value === chosen)) select.value = chosen;
     region.querySelectorAll("[data-joint]").forEach((part) => { part.hidden = part.dataset.joint !== select.value; });
-    const folded = region.querySelector("details.of-leg");
-    if (folded && folded.open !== isOpen) folded.open = isOpen;
     document.dispatchEvent(new Event("shown"));
   }
 
@@ -19,11 +17,6 @@
     event.target.blur();  // what is in use is not replaced
     show();
   });
-  document.addEventListener("toggle", (event) => {
-    if (!event.target.matches("details.of-leg") || !event.target.isConnected) return;
-    isOpen = event.target.open;
-    document.dispatchEvent(new Event("shown"));
-  }, true);
   document.addEventListener("replaced", show);
   show();
 })();

@@ -8,7 +8,7 @@ from setuptools import setup
 FRACTION = "share/leg_wear_monitor"
 # What builds the pages below docs/ is no page, and what the site's build writes there comes and goes.
 SITE = ("docs/conf.py", "docs/_", "docs/lessons/")
-TOPS = ("bags", "config", "docs", "examples", "foxglove", "launch", "plotjuggler", "rviz", "security")
+TOPS = ("bags", "config", "docs", "examples", "launch", "rviz", "security")
 
 
 def share_files() -> list[tuple[str, list[str]]]:

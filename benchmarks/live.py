@@ -61,7 +61,6 @@ SHOWN = ("received", "shed_messages")
 TYPES = {
     "clearance_states": JointState,
     "predicted_torque": WrenchStamped,
-    "measured_torque": WrenchStamped,
     "impact_forces": JointState,
     "linkage_states": JointState,
     "markers": MarkerArray,

@@ -31,7 +31,6 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import build_linkage, ideal_motion
-from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.ros.gait_publisher import time_message
 from leg_wear_monitor.ros.inputs import message_class
 
@@ -108,7 +107,7 @@ class JointStateBroadcaster(Node):
         super().__init__("joint_state_broadcaster", **options)
         qos = QoSPresetProfiles.SYSTEM_DEFAULT.value
         self._joint_states = self.create_publisher(JointState, "joint_states", qos)
-        dynamic = message_class(encode.DYNAMIC_JOINT_STATE)
+        dynamic = message_class("control_msgs/msg/DynamicJointState")
         self._dynamic_joint_states = self.create_publisher(dynamic, "dynamic_joint_states", qos)
 
     def update(self, stamp_ns: int, states: Mapping[str, Mapping[str, float]]) -> None:
@@ -120,8 +119,17 @@ class JointStateBroadcaster(Node):
         for field in movement:
             setattr(message, field, [float(states[name].get(field, math.nan)) for name in names])
         self._joint_states.publish(message)
-        raw = encode.dynamic_joint_states([stamp_ns], states, frame_id="base_link")[0]
-        self._dynamic_joint_states.publish(raw.tobytes())
+        interface_value = message_class("control_msgs/msg/InterfaceValue")
+        self._dynamic_joint_states.publish(
+            message_class("control_msgs/msg/DynamicJointState")(
+                header=message.header,
+                joint_names=list(states),
+                interface_values=[
+                    interface_value(interface_names=list(one), values=[*map(float, one.values())])
+                    for one in states.values()
+                ],
+            )
+        )
 
 
 class ForceTorqueSensorBroadcaster(Node):

@@ -13,8 +13,6 @@ from leg_wear_monitor.mechanism.arrays import Floats
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
-DYNAMIC_JOINT_STATE = "control_msgs/msg/DynamicJointState"
-FLOAT64 = "std_msgs/msg/Float64"
 STRING = "std_msgs/msg/String"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
@@ -155,45 +153,6 @@ def wrenches(
         column = np.zeros((n, 3)) if values is None else np.asarray(values, float)
         layout.column(column.astype("<f8").reshape(n, 3))
     return layout.messages(n)
-
-
-def dynamic_joint_states(
-    stamp_ns: ArrayLike, interfaces: Mapping[str, Mapping[str, ArrayLike]], *, frame_id: str = ""
-) -> NDArray[np.uint8]:
-    """Messages of control_msgs/DynamicJointState.
-
-    Parameters
-    ----------
-    stamp_ns : (n,) array of int
-        Stamps of the headers [ns].
-    interfaces : dict
-        Values (n,) by the names of joints and their interfaces.
-    frame_id : str
-
-    Returns
-    -------
-    (n, bytes) array of uint8
-        A message a row.
-    """
-    layout = Layout()
-    n = layout.header(stamp_ns, frame_id)
-    layout.texts(interfaces)
-    layout.count(len(interfaces))
-    for values in interfaces.values():
-        layout.texts(values)
-        layout.count(len(values))
-        if values:
-            columns = [np.broadcast_to(np.asarray(each, "<f8"), n) for each in values.values()]
-            layout.column(np.stack(columns, axis=1))
-    return layout.messages(n)
-
-
-def float64s(values: ArrayLike) -> NDArray[np.uint8]:
-    """Messages of std_msgs/Float64, from values (n,): a message a row."""
-    numbers = np.atleast_1d(np.asarray(values, "<f8"))
-    layout = Layout()
-    layout.column(numbers[:, None])
-    return layout.messages(len(numbers))
 
 
 def string(text: str) -> bytes:

@@ -1,7 +1,6 @@
 """Conversion of reports to serialized output messages, byte-identical live and in replay."""
 
 import json
-import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
@@ -34,17 +33,13 @@ from leg_wear_monitor.twin import CRANK
 CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
 IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
 TORQUE = Output("~/predicted_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
-MEASURED_TORQUE = Output("~/measured_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
 FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY, LATCHED)
 ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
 VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 STATE = Output("~/state", encode.STRING, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
 OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
-"""Outputs of every monitor; `Messages.outputs` has all."""
-
-SCALARS = ("clearance_m", "estimated_m", "remaining_p50_h", "peak_force_n")
-"""Values of each clearance joint as numbers of their own, because tools plot arrays by index only."""
+"""Outputs of every monitor."""
 
 _DIGITS = 15
 
@@ -59,21 +54,10 @@ class Messages:
         The clearance joints, in the order of the reports.
     node : str
         Full name of the node; without its leading slash, it prefixes the names in diagnostics.
-
-    Attributes
-    ----------
-    outputs : tuple of Output
-        All topics that the parameters ask for.
     """
 
     def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
         self.config, self._node = config, node.lstrip("/")
-        named = [(joint, name) for joint in clearance_joints for name in SCALARS]
-        self._scalars = {
-            each: Output(f"~/joints/{'/'.join(each)}", encode.FLOAT64)
-            for each in (named if config.publish_scalars else ())
-        }
-        self.outputs = (*OUTPUTS, *((MEASURED_TORQUE, *self._scalars.values()) if self._scalars else ()))
         self._forecasts = ForecastTimes()
         self._clearances = [f"{joint}_clearance" for joint in clearance_joints]
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
@@ -81,9 +65,7 @@ class Messages:
     def of(self, reports: Reports) -> Iterator[Outgoing]:
         """All messages for reports except forecasts: samples, gait cycles, alarms, verdict and state."""
         yield from self._of_samples(reports.samples)
-        for cycle in reports.cycles:
-            yield self._clearance_states(cycle)
-            yield from self._joint_values(cycle)
+        yield from map(self._clearance_states, reports.cycles)
         yield from map(self.alarms, reports.alarms)
         yield from map(self.verdict, reports.verdicts)
         yield from map(self.state, reports.states)
@@ -93,22 +75,18 @@ class Messages:
         return map(self.forecast, self._forecasts.due(reports))
 
     def _of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
-        """Torque at each tracked sample, contact forces at each crank sample, and the measured torque."""
+        """Torque at each tracked sample, and contact forces at each crank sample."""
         followed = np.isfinite(samples.predicted_torque_nm)
         if followed.any():
-            yield self._torques(TORQUE, samples.stamp_ns[followed], samples.predicted_torque_nm[followed])
-        measured = np.isfinite(samples.measured_torque_nm)
-        if self._scalars and measured.any():
-            torques = samples.measured_torque_nm[measured]
-            yield self._torques(MEASURED_TORQUE, samples.stamp_ns[measured], torques)
+            yield self._torques(samples.stamp_ns[followed], samples.predicted_torque_nm[followed])
         followed &= samples.kind == CRANK
         if self.config.publish_impact_forces and followed.any():
             yield self._forces(samples, followed)
 
-    def _torques(self, output: Output, stamps: NDArray[np.int64], torques: Floats) -> Outgoing:
+    def _torques(self, stamps: NDArray[np.int64], torques: Floats) -> Outgoing:
         torque = np.zeros((len(stamps), 3))
         torque[:, "xyz".index(self.config.drive_torque.axis)] = torques
-        return Outgoing(output, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
+        return Outgoing(TORQUE, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
 
     def _forces(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
         stamps, forces = samples.stamp_ns[which], samples.contact_force_n[which]
@@ -126,16 +104,6 @@ class Messages:
             frame_id=self.config.frame_id,
         )
         return single(CLEARANCES, cycle.stamp_ns, rows.tobytes())
-
-    def _joint_values(self, cycle: CycleReport) -> Iterator[Outgoing]:
-        """Values of `SCALARS`; a value that is not known has no message."""
-        for joint in cycle.joints if self._scalars else ():
-            hours = joint.forecast.hours if joint.forecast else None
-            values = (joint.clearance_m, joint.estimated_m, hours.p50 if hours else None, joint.peak_force_n)
-            for name, value in zip(SCALARS, values, strict=True):
-                if value is not None and math.isfinite(value):
-                    raw = encode.float64s(value)[0].tobytes()
-                    yield single(self._scalars[joint.joint, name], cycle.stamp_ns, raw)
 
     def forecast(self, cycle: CycleReport) -> Outgoing:
         """Remaining life of each joint and of the leg after a gait cycle."""

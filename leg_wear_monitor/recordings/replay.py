@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings.bag import Recordable, listed_recordings
 from leg_wear_monitor.recordings.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.recordings.leg_markers import LegDrawing, LegMarkers
-from leg_wear_monitor.recordings.outputs import Messages
+from leg_wear_monitor.recordings.outputs import OUTPUTS, Messages
 from leg_wear_monitor.recordings.reader import Block, Recording
 from leg_wear_monitor.recordings.streams import Outgoing, topic_of
 from leg_wear_monitor.recordings.summary import History, ReplayResult
@@ -280,7 +280,7 @@ class Sink:
         self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)
         self._channels = {
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)
-            for output in self._messages.outputs
+            for output in OUTPUTS
         }
         self._start: tuple[AlarmList, VerdictReport] | None = (monitor.alarms, monitor.state_report)
         self._markers = (

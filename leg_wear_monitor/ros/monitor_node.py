@@ -186,7 +186,7 @@ _RECEIVE_S = 1.0
 _RELEASE_S = 10.0  # period at which free memory is given back, in 0.2 ms
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
-_A_SAMPLE = (outputs.TORQUE, outputs.MEASURED_TORQUE, outputs.IMPACTS)
+_A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
 
 
 class MonitorNode(ClosingNode):
@@ -241,7 +241,7 @@ class MonitorNode(ClosingNode):
         self._black_box = BlackBox(
             config.record.path, config.record.stop_recording_dir, config.hardware, report
         )
-        self._outlets = Outlets(self, self._messages.outputs, self._black_box)
+        self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._compile(decoder)
         mechanism = self._monitor.mechanism
         parameters.follow(

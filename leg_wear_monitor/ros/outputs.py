@@ -22,7 +22,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, String
+from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.errors import LegWearError
@@ -264,7 +264,6 @@ _KINDS = {
     "sensor_msgs/msg/JointState": JointState,
     "geometry_msgs/msg/WrenchStamped": WrenchStamped,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
-    "std_msgs/msg/Float64": Float64,
     "std_msgs/msg/String": String,
     "visualization_msgs/msg/MarkerArray": MarkerArray,
 }

@@ -6,6 +6,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
+from raw_messages import DYNAMIC_JOINT_STATE, dynamic_joint_state
 
 from leg_wear_monitor import Mechanism, MonitorConfig
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model
@@ -132,10 +133,12 @@ def record() -> Record:
                 warm = np.full(n, 40.0) + 0.01 * walk.time_s
                 crank = {"position": position, "motor_current": torque, "temperature": warm}
                 states = {"crank": crank, "hip": {"motor_current": noise[1]}}
-                rows = encode.dynamic_joint_states(stamps, states)
-                writer.write_many(
-                    writer.channel("/dynamic_joint_states", encode.DYNAMIC_JOINT_STATE), stamps, rows
-                )
+                channel = writer.channel("/dynamic_joint_states", DYNAMIC_JOINT_STATE)
+                for k, stamp in enumerate(stamps.tolist()):
+                    now = {
+                        joint: {name: each[k] for name, each in one.items()} for joint, one in states.items()
+                    }
+                    writer.write(channel, stamp, dynamic_joint_state(stamp, now))
         return path
 
     return write

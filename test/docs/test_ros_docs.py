@@ -105,7 +105,7 @@ def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
         (package / "config" / "tools.yaml").read_text(encoding="utf-8")
     )
     config = parse_config(document, "tools.yaml", "/left/leg_wear_monitor")
-    assert config.publish_scalars and config.publish_markers
+    assert config.publish_markers
     for name in ("monitor", "demo"):
         launch = ElementTree.parse(package / "launch" / f"{name}.launch.xml").getroot()
         values = {next(iter(one.items())): one.get("value") for one in launch.iterfind("let")}
@@ -152,10 +152,10 @@ def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLI
 @pytest.mark.parametrize(
     ("make", "own", "idle"),
     [
-        (MonitorNode, {"publish_scalars": True, "foot_load__source": "wrench"}, "dynamic_joint_states"),
+        (MonitorNode, {"foot_load__source": "wrench"}, "dynamic_joint_states"),
         pytest.param(
             MonitorNode,
-            {"publish_scalars": True, "foot_load__source": "wrench", "drive_torque__source": "interface"},
+            {"foot_load__source": "wrench", "drive_torque__source": "interface"},
             "drive_torque",
             marks=pytest.mark.skipif(not find_spec("control_msgs"), reason="control_msgs is not installed"),
         ),

@@ -13,11 +13,11 @@ import pytest
 pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
+from raw_messages import dynamic_joint_state
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.monitor.config.parameters import load_config
-from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.message_checks import wanted_interfaces
 from leg_wear_monitor.ros import inputs
@@ -156,7 +156,7 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
         ),
         ("leg_crank", {"motor_current": 1.0, "motor_temperature": 41.0}, ""),
     ):
-        box.add(inputs.INTERFACES, encode.dynamic_joint_states([1], {joint: there})[0].tobytes(), 1)
+        box.add(inputs.INTERFACES, dynamic_joint_state(1, {joint: there}), 1)
         arrivals = box.take(1)
         names.note(arrivals, box.decoded(arrivals))
         assert names.report() == report

@@ -299,10 +299,6 @@ class MonitorConfig:
     publish_impact_forces: bool = described(
         "publish the contact forces of every sample", default=True, metadata=LIVE
     )
-    publish_scalars: bool = described(
-        "publish each value of a joint on its own topic, and the measured torque, for plots",
-        default=False,
-    )
     publish_markers: bool = described("publish markers for RViz and Foxglove", default=False, metadata=LIVE)
     frame_id: str = described("frame of the pelvis, for wrenches and markers", default="pelvis", check=filled)
 

@@ -36,7 +36,7 @@ from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
-from leg_wear_monitor.state import Level, State
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 # Samples whose time is already in the ledger: the clock was reset, or a recording is played back.
@@ -236,11 +236,7 @@ class MonitorNode(ClosingNode):
         self._load = Load()
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
-        self._is_stop = self._monitor.verdict.verdict.state is State.STOP  # not a new stop
-        report = self.get_logger().info
-        self._black_box = BlackBox(
-            config.record.path, config.record.stop_recording_dir, config.hardware, report
-        )
+        self._black_box = BlackBox(config.record.path, self.get_logger().info)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._compile(decoder)
         mechanism = self._monitor.mechanism
@@ -337,10 +333,11 @@ class MonitorNode(ClosingNode):
         """Process received messages, a bounded number at a time."""
         coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
         arrivals = self._inbox.take(_AT_ONCE)
-        if self._black_box.takes_inputs:
+        if self._black_box.on:
             names = {topic.stream.code: topic.name for topic in self._supervision.inputs}
             for arrival in arrivals:
-                self._black_box.write(names[arrival.code], arrival.log_time_ns, arrival.raw)
+                row = np.frombuffer(arrival.raw, np.uint8)[None, :]
+                self._black_box.write(names[arrival.code], arrival.log_time_ns, row)
         samples = self._inbox.decoded(arrivals)
         self._epochs.check(samples)
         self._monitor.note_late(self._load.is_late(time.monotonic_ns()))
@@ -364,10 +361,6 @@ class MonitorNode(ClosingNode):
                 self._load.unpublished += len(outgoing.stamp_ns)
             elif self._outlets.wanted(outgoing.output):
                 self._outlets.send(outgoing, now_ns)
-        for verdict in reports.verdicts:
-            was_stop, self._is_stop = self._is_stop, verdict.verdict.state is State.STOP
-            if self._is_stop and not was_stop:
-                self._black_box.stop(now_ns)
         for forecast in self._messages.forecasts(reports):
             self._outlets.send(forecast, now_ns)
 

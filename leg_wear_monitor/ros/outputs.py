@@ -1,8 +1,6 @@
 """Outputs of the node: topics, markers, and the recording of all of them."""
 
-import re
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -36,96 +34,6 @@ if TYPE_CHECKING:
     from leg_wear_monitor.recordings.mcap_file import McapWriter
 
 
-# Separate recordings of the seconds around a STOP.
-
-
-_BEFORE_NS, _AFTER_NS = 30_000_000_000, 10_000_000_000
-
-
-class StopRecorder:
-    """Keeps the messages of the last 30 s in memory; a STOP writes them and the messages of the next 10 s.
-
-    Parameters
-    ----------
-    directory : str
-        Directory of the files, one per STOP, named by the computer's time (UTC) and the leg.
-    leg : str
-        Hardware id; several legs may write into one directory.
-    report : callable
-        Called with a line for the log.
-
-    Raises
-    ------
-    LegWearError
-        If the directory cannot be made; later, if a file cannot be written.
-    """
-
-    def __init__(self, directory: str, leg: str, report: Callable[[str], None]) -> None:
-        self._directory, self._report = Path(directory), report
-        self._leg = re.sub(r"[^\w.-]", "_", leg)  # such as robot/left, which would be a directory
-        try:
-            self._directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise LegWearError(
-                f"record.stop_recording_dir: {directory} cannot be made: {error.strerror}"
-            ) from error
-        self._kept: deque[tuple[int, str, bytes | NDArray[np.uint8]]] = deque()
-        self._topics: dict[str, tuple[str, Qos]] = {}
-        self._writer: McapWriter | None = None
-        self._channels: dict[str, int] = {}
-        self._until_ns = 0
-
-    def add_topic(self, topic: str, kind: str, qos: Qos) -> None:
-        """Register a topic by its full name and type."""
-        self._topics[topic] = kind, qos
-
-    def keep(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
-        """Keep a message, or several of equal length (n, bytes)."""
-        if self._writer is not None and log_time_ns > self._until_ns:
-            self.close()
-        self._kept.append((log_time_ns, topic, raw))
-        # This also removes messages stamped in the future by a clock that was set back.
-        while not log_time_ns - _BEFORE_NS <= self._kept[0][0] <= log_time_ns:
-            self._kept.popleft()
-        if self._writer is not None:
-            self._write(log_time_ns, topic, raw)
-
-    def stop(self, now_ns: int) -> None:
-        """Begin a file with the stored messages; a file that is still being written gets no second file."""
-        if self._writer is not None:
-            return
-        path = self._directory / f"stop-{_utc(now_ns * 1.0e-9)}-{self._leg}.mcap"
-        self._writer = _writer("record.stop_recording_dir", path, self._report)
-        self._channels = {name: self._writer.channel(name, *spec) for name, spec in self._topics.items()}
-        self._until_ns = now_ns + _AFTER_NS
-        for kept in self._kept:
-            self._write(*kept)
-
-    def flush(self) -> None:
-        """Flush the written messages to the disk."""
-        if self._writer is not None:
-            self._writer.flush()
-
-    def close(self) -> None:
-        """Finish the file that is being written."""
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            writer.close()
-
-    def _write(self, log_time_ns: int, topic: str, raw: bytes | NDArray[np.uint8]) -> None:
-        if self._writer is not None:
-            put(self._writer, self._channels[topic], log_time_ns, raw)
-
-
-def put(writer: "McapWriter", channel: int, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> int:
-    """Write a message, or several of equal length (n, bytes); returns their number."""
-    if isinstance(raw, bytes):
-        writer.write(channel, log_time_ns, raw)
-        return 1
-    writer.write_many(channel, np.full(len(raw), log_time_ns, np.int64), raw)
-    return len(raw)
-
-
 # MCAP recording of all messages the node receives and publishes; its replay reproduces the live run.
 
 
@@ -136,10 +44,6 @@ class BlackBox:
     ----------
     path : str
         MCAP file; empty disables the recording. An earlier recording of this name is kept under a new name.
-    stops : str
-        Directory for recordings of the seconds around a STOP; empty for none.
-    leg : str
-        Hardware id, for the names of these recordings.
     report : callable
         Called with a line for the log: the file that is written, and the new name of an earlier file.
 
@@ -153,13 +57,12 @@ class BlackBox:
     Raises
     ------
     LegWearError
-        If the file, or the directory, cannot be created.
+        If the file cannot be created.
     """
 
-    def __init__(self, path: str, stops: str, leg: str, report: Callable[[str], None]) -> None:
+    def __init__(self, path: str, report: Callable[[str], None]) -> None:
         self.fault, self.recorded = "", 0
-        self._stops = StopRecorder(stops, leg, report) if stops else None
-        self._writer = _writer("record.path", Path(path), report) if path else None
+        self._writer = _writer(Path(path), report) if path else None
         self._channels: dict[str, int] = {}
 
     @property
@@ -167,49 +70,25 @@ class BlackBox:
         """True if all messages are recorded, including messages without a subscriber."""
         return self._writer is not None
 
-    @property
-    def takes_inputs(self) -> bool:
-        """True if received messages are recorded, or kept for a STOP."""
-        return self.on or self._stops is not None
-
     def add_topic(self, topic: str, kind: str, qos: "Qos") -> None:
         """Register a topic by its full name and type."""
-        if self._stops is not None:
-            self._stops.add_topic(topic, kind, qos)
         if self._writer is not None:
             self._channels[topic] = self._writer.channel(topic, kind, qos)
 
-    def write(self, topic: str, log_time_ns: int, raw: bytes | NDArray[np.uint8]) -> None:
-        """Record a message, or several of equal length (n, bytes)."""
-        self._with_stops(lambda stops: stops.keep(topic, log_time_ns, raw))
-
-        def record(writer: "McapWriter") -> None:
-            self.recorded += put(writer, self._channels[topic], log_time_ns, raw)
-
-        self._with_writer(record)
-
-    def stop(self, now_ns: int) -> None:
-        """Write the seconds around a STOP, if a directory is configured."""
-        self._with_stops(lambda stops: stops.stop(now_ns))
+    def write(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
+        """Record messages of equal length (n, bytes)."""
+        times = np.full(len(rows), log_time_ns, np.int64)
+        self._with_writer(lambda writer: writer.write_many(self._channels[topic], times, rows))
+        self.recorded += len(rows) if self.on else 0
 
     def flush(self) -> None:
         """Write buffered messages to the disk."""
-        self._with_stops(StopRecorder.flush)
         self._with_writer(lambda writer: writer.flush())
 
     def close(self) -> None:
-        """Finish the files."""
-        self._with_stops(StopRecorder.close)
+        """Finish the file."""
         self._with_writer(lambda writer: writer.close())
         self._writer = None
-
-    def _with_stops(self, use: Callable[[StopRecorder], None]) -> None:
-        """Use the recorder of stops, if there is one; a disk failure ends the recorder, not the monitor."""
-        if self._stops is not None:
-            try:
-                use(self._stops)
-            except LegWearError as error:
-                self.fault, self._stops = str(error), None
 
     def _with_writer(self, use: Callable[["McapWriter"], None]) -> None:
         """Use the writer, if there is one; a disk failure ends the recording, not the monitor."""
@@ -223,19 +102,19 @@ class BlackBox:
                     writer.close()
 
 
-def _writer(parameter: str, path: Path, report: Callable[[str], None]) -> "McapWriter":
+def _writer(path: Path, report: Callable[[str], None]) -> "McapWriter":
     """A writer of a file; a recording that the file contains is kept, and the log names both files."""
     try:
         from leg_wear_monitor.recordings.mcap_file import McapWriter
     except ImportError as error:
-        raise LegWearError(f"{parameter}: {error}; pip install 'leg_wear_monitor[bags]'") from error
-    earlier = _move_aside(parameter, path)
+        raise LegWearError(f"record.path: {error}; pip install 'leg_wear_monitor[bags]'") from error
+    earlier = _move_aside(path)
     writer = McapWriter(path)
     report(f"recording to {path}" + (f"; the earlier recording is kept as {earlier}" if earlier else ""))
     return writer
 
 
-def _move_aside(parameter: str, path: Path) -> Path | None:
+def _move_aside(path: Path) -> Path | None:
     """Rename a file that is not empty by the time of its last change (UTC); its new name.
 
     A restart with the same parameters must not delete the earlier recordings.
@@ -243,16 +122,12 @@ def _move_aside(parameter: str, path: Path) -> Path | None:
     try:
         if not path.is_file() or not path.stat().st_size:
             return None
-        stem = f"{path.stem}-{_utc(path.stat().st_mtime)}"
+        changed = datetime.fromtimestamp(path.stat().st_mtime, UTC)
+        stem = f"{path.stem}-{changed:%Y%m%dT%H%M%SZ}"
         names = (f"{stem}{again}{path.suffix}" for again in chain([""], (f"-{n}" for n in count(2))))
         return path.rename(next(each for each in map(path.with_name, names) if not each.exists()))
     except OSError as error:
-        raise LegWearError(f"{parameter}: {path} cannot be renamed: {error.strerror}") from error
-
-
-def _utc(time_s: float) -> str:
-    """Time in the name of a file."""
-    return datetime.fromtimestamp(time_s, UTC).strftime("%Y%m%dT%H%M%SZ")
+        raise LegWearError(f"record.path: {path} cannot be renamed: {error.strerror}") from error
 
 
 # Output topics of the monitor: serialized messages are published and recorded.

@@ -16,7 +16,6 @@ from leg_wear_monitor import replay
 from leg_wear_monitor.gait.config import (
     EncoderConfig,
     FootLoadSensorConfig,
-    KnockConfig,
     LoadConfig,
     TorqueSensorConfig,
 )
@@ -24,7 +23,6 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.ros.gait_publisher import GaitPublisher, PublisherConfig
-from leg_wear_monitor.state import State
 from leg_wear_monitor.twin import CRANK
 
 # The monitor over real DDS: who it hears, through what it goes on, and what it takes of a foot load.
@@ -138,20 +136,6 @@ def test_a_foot_load_is_taken_reported_recorded_and_replayed(
     assert len(replayed[f"{ME}/clearance_states"]) >= 2
     for topic in ("clearance_states", "predicted_torque", "impact_forces"):
         assert lived[f"{ME}/{topic}"] == replayed[f"{ME}/{topic}"]
-
-
-def test_what_is_kept_of_a_break_out_replays_to_its_stop(stage, tmp_path: Path) -> None:
-    """The file is written by itself; its replay has the verdict of the node: the walk is below 30 s."""
-    breaks = KnockConfig(joint="G", at_s=7.0, clearance_m=2.0e-3)
-    monitor = stage.monitor(record__stop_recording_dir=str(tmp_path / "stops"))
-    stage.legs().play(stage.walk(PublisherConfig(duration_s=13.0, knock=breaks)), monitor)
-    monitor.stop()
-    live = monitor.node.monitor.verdict.verdict
-    assert (live.state, live.joints) == (State.STOP, ("G",))
-    (kept,) = (tmp_path / "stops").iterdir()
-    again = replay(kept, config_from({})).monitor.verdict.verdict
-    assert (again.fault_code, again.evidence) == (live.fault_code, live.evidence)
-    assert again.fault_code == "CLEARANCE_DETECTED_G"
 
 
 # The synthetic leg as a node: everything it walks is published, in order, with its truth.

@@ -220,11 +220,6 @@ class Record:
     """A recording of the messages that the node receives and publishes."""
 
     path: str = described("MCAP file to write; if empty, the node writes no recording", default="")
-    stop_recording_dir: str = described(
-        "directory for MCAP files of the 30 s before and 10 s after each stop verdict; if empty, none is "
-        "written",
-        default="",
-    )
 
 
 @attrs.frozen(kw_only=True)

@@ -299,8 +299,8 @@ ALL = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
 OF_TORQUE = frozenset((*(spec.name() for spec in TORQUE), "input_torque"))
 """Names of the alarms whose values need a drive torque."""
 
-SILENCE, AHEAD = "input_silence", "stamps_ahead"
-"""Kinds of alarms of the node, which has a clock."""
+SILENCE = "input_silence"
+"""Kind of the alarms of the node, which has a clock."""
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = {spec.kind: spec for spec in ALL}
@@ -310,14 +310,6 @@ KINDS = {spec.kind: spec for spec in ALL}
 QUANTITIES = {
     **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
     **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},
-    **{
-        f"{alarm} {kind.name}": noun.format(kind.name)
-        for kind in SAMPLE_KINDS.values()
-        for alarm, noun in (
-            (SILENCE, "time without {} samples"),
-            (AHEAD, "lead of the {}'s stamps over the clock"),
-            (SOURCES.kind, "number of publishers of the {}"),
-        )
-    },
+    **{f"{SILENCE} {kind.name}": f"time without {kind.name} samples" for kind in SAMPLE_KINDS.values()},
 }
 """Nouns by the alarm's name; by its kind for an alarm of a joint. The last ones are alarms of the node."""

@@ -173,6 +173,11 @@ class Piece:
     stored: int
     samples: Samples | None = None
 
+    def raw(self, number: int) -> bytes:
+        """Bytes of a message."""
+        message = self.messages[number]
+        return self.data[message["begin"] : message["end"]].tobytes()
+
 
 Due = tuple[int, Callable[[], Piece | None]]
 """A piece that is not loaded yet, so that a merge of many files has few pieces in memory.

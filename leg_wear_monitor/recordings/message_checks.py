@@ -1,7 +1,7 @@
 """Checks of messages for reports: missing names, and the axis of a torque."""
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.cdr import ENCAPSULATION
 from leg_wear_monitor.recordings.findings import listed
-from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
+from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
 
 
 class _Fields:
@@ -52,28 +53,12 @@ def interfaces_in(raw: bytes) -> dict[str, list[str]]:
     return found
 
 
-def wanted_interfaces(config: MonitorConfig) -> dict[str, str]:
-    """Interfaces of the crank to read, by the parameters that name them; empty names are not read."""
-    return {
-        "drive_torque.interface": config.drive_torque.interface,
-        "drive.temperature_interface": config.drive.temperature_interface,
-    }
-
-
 def twice(names: Sequence[str], joint: str) -> str:
     """Report that a name occurs several times, and at which places; empty if it occurs at most once."""
     places = [str(i + 1) for i, name in enumerate(names) if name == joint]
     if len(places) < 2:
         return ""
     return f"joints {' and '.join(places)} of joint_states are both named {joint!r}: rename one of them"
-
-
-def is_without(samples: Samples, interfaces: Mapping[str, str]) -> NDArray[np.bool_]:
-    """Mask (n,) of the samples of control_msgs/DynamicJointState that lack a wanted interface."""
-    absent = samples["fault"] == MISSING_JOINT
-    if interfaces["drive.temperature_interface"]:
-        absent |= (samples["fault"] == NO_FAULT) & np.isnan(samples["temperature_c"])
-    return np.asarray(absent)
 
 
 def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> str:
@@ -96,7 +81,7 @@ def without_interface(raw: bytes, joint: str, interfaces: Mapping[str, str]) -> 
     return f"{joint} has no interface {names}. It has {listed(sorted(there[joint]))}; set {keys}"
 
 
-# Check that the drive torque is about the configured axis; otherwise report the axis that has a torque.
+# Checks of all messages, in a recording or live: the crank's name, its interfaces, the axis of its torque.
 
 
 _AXES = "xyz"
@@ -105,30 +90,86 @@ _KEPT = 400
 _LEAST = 40
 _SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
 _STILL = 0.02  # Largest RMS of noise and crosstalk between a sensor's axes, as a fraction
+_WITH_CRANK = (NO_FAULT, NOT_FINITE, ZERO_STAMP)  # faults of messages that have the crank
+_NAMED = 5  # messages without the crank of which the names are read
 
 
-class WrenchAxis:
-    """Compares the three torques of wrenches.
+class MessageChecks:
+    """Searches messages for the crank joint, its interfaces, and a torque about the configured axis.
+
+    Several nodes may publish joints of one robot on one topic, so messages without the crank are a fault only
+    if no message has it.
 
     Parameters
     ----------
-    axis : str
-        Axis that is read, ``x``, ``y`` or ``z``.
-    predicted_nm : float, optional
-        RMS of the predicted torque at the sensor.
+    config : MonitorConfig
+    predicted_nm : float
+        RMS of the predicted torque at the sensor; 0 if it is not known.
+    compared : int
+        Most wrenches of a block that are compared, to limit the cost.
+
+    Attributes
+    ----------
+    found, missing : int
+        Numbers of joint states with the crank and without it.
+    lacking : int
+        Number of messages that lack an interface.
     """
 
-    def __init__(self, axis: str, predicted_nm: float = 0.0) -> None:
-        self._axis, self._predicted_nm = _AXES.index(axis), predicted_nm
+    def __init__(self, config: MonitorConfig, predicted_nm: float = 0.0, compared: int = 100) -> None:
+        self._crank, self._predicted_nm, self._compared = config.crank_joint, predicted_nm, compared
+        self._interfaces = {
+            "drive_torque.interface": config.drive_torque.interface,
+            "drive.temperature_interface": config.drive.temperature_interface,
+        }
+        self._axis = _AXES.index(config.drive_torque.axis)
         self._torques: list[tuple[float, float, float]] = []
+        self.forget_names()
 
-    def add(self, wrenches: Iterable[bytes]) -> None:
-        """Add sound messages of geometry_msgs/WrenchStamped."""
-        for raw in wrenches:
-            self._torques.append(_TORQUE.unpack_from(raw, len(raw) - _TORQUE.size))
+    def forget_names(self) -> None:
+        """Begin a new period of the checks of names."""
+        self.found, self.missing, self.lacking = 0, 0, 0
+        self._names: set[str] = set()
+        self._again, self._lack = "", ""
+
+    def add(self, codes: NDArray[np.int64], samples: Samples, raw: Callable[[int], bytes]) -> None:
+        """Add messages: codes of their streams (n,), their samples, and a function that gives their bytes."""
+        is_good = samples["fault"] == NO_FAULT
+        is_joint_state, is_missing = codes == JOINT_STATE, samples["fault"] == MISSING_JOINT
+        self.found += int(np.count_nonzero(is_joint_state & np.isin(samples["fault"], _WITH_CRANK)))
+        missing = np.flatnonzero(is_joint_state & is_missing).tolist()
+        self.missing += len(missing)
+        for i in missing[-_NAMED:]:
+            names = names_in(raw(i))
+            self._names |= set(names)
+            self._again = self._again or twice(names, self._crank)
+        if self._interfaces["drive.temperature_interface"]:
+            is_missing |= is_good & np.isnan(samples["temperature_c"])
+        lacking = np.flatnonzero((codes == INTERFACES) & is_missing).tolist()
+        self.lacking += len(lacking)
+        if lacking and not self._lack:
+            self._lack = without_interface(raw(lacking[0]), self._crank, self._interfaces)
+        wrenches = np.flatnonzero(is_good & (codes == WRENCH_STAMPED))
+        for i in wrenches[:: max(1, len(wrenches) // self._compared)].tolist():
+            wrench = raw(i)
+            self._torques.append(_TORQUE.unpack_from(wrench, len(wrench) - _TORQUE.size))
         del self._torques[:-_KEPT]
 
-    def report(self) -> str:
+    @property
+    def crank_fault(self) -> str:
+        """Why the crank is not read; empty if a message has it, or none came."""
+        if self._again or self.found or not self.missing:
+            return self._again
+        there = listed(sorted(self._names))
+        return f"no joint is named {self._crank!r}; the joints are {there}; set crank_joint (--crank-joint)"
+
+    @property
+    def interface_fault(self) -> str:
+        """Which interface a message lacks, and those that exist; empty if none is missing."""
+        return self._lack
+
+    @property
+    def axis_fault(self) -> str:
         """Report that a different axis carries the torque; empty if the configured axis carries it."""
         if len(self._torques) < _LEAST:
             return ""

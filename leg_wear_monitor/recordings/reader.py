@@ -1,7 +1,7 @@
 """Reads recordings, even if damaged, as blocks of gait samples in log-time order, in bounded memory."""
 
 import heapq
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import repeat
 from pathlib import Path
@@ -16,23 +16,14 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings import bag
 from leg_wear_monitor.recordings.cdr import Decoder, mark_zero_stamps
 from leg_wear_monitor.recordings.findings import Finding, Piece, RecordingError, Severity, listed
-from leg_wear_monitor.recordings.message_checks import (
-    WrenchAxis,
-    is_without,
-    names_in,
-    twice,
-    wanted_interfaces,
-    without_interface,
-)
-from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, WRENCH_STAMPED, streams_of
+from leg_wear_monitor.recordings.message_checks import MessageChecks
+from leg_wear_monitor.recordings.streams import JOINT_STATE, streams_of
 from leg_wear_monitor.twin import CRANK
 from leg_wear_monitor.twin.crank_motion import BACKWARD_JUMP_NS
 from leg_wear_monitor.twin.sample import (
     BRIDGE_LIMIT_S,
     GAIT_SAMPLE,
-    MISSING_JOINT,
     NO_FAULT,
-    NOT_FINITE,
     ZERO_STAMP,
     Samples,
 )
@@ -73,70 +64,6 @@ def check_topics(
         text = f"has no topic {topic}: no crank is read from it"
         findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
     return findings
-
-
-_WITH_CRANK = (NO_FAULT, NOT_FINITE, ZERO_STAMP)  # faults of messages that have the crank
-
-
-class JointNames:
-    """Searches the messages of a recording for the crank joint and its interfaces.
-
-    Parameters
-    ----------
-    crank_joint : str
-    interfaces : mapping of str to str
-        Interfaces returned by `wanted_interfaces`.
-    """
-
-    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
-        self._crank, self._interfaces = crank_joint, interfaces
-        self._found, self._missing, self._without = 0, 0, 0
-        self._names: set[str] = set()
-        self._twice, self._absent = "", ""
-
-    def add_samples(self, piece: Piece, samples: Samples) -> None:
-        """Count messages, using the samples decoded from them."""
-        messages = piece.messages
-        cranks = messages["type"] == JOINT_STATE
-        self._found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _WITH_CRANK)))
-        missing = messages[cranks & (samples["fault"] == MISSING_JOINT)]
-        self._missing += len(missing)
-        if len(missing):
-            names = names_in(_raw(piece, missing[0]))
-            self._names |= set(names)
-            self._twice = self._twice or twice(names, self._crank)
-        without = messages[(messages["type"] == INTERFACES) & is_without(samples, self._interfaces)]
-        self._without += len(without)
-        if len(without) and not self._absent:
-            self._absent = without_interface(_raw(piece, without[0]), self._crank, self._interfaces)
-
-    def findings(self, path: Path) -> list[Finding]:
-        """Findings after all messages have been read.
-
-        Raises
-        ------
-        RecordingError
-            If messages contain joints but never the crank.
-        """
-        findings = []
-        if self._absent:
-            text = f"{self._without} messages of dynamic_joint_states: {self._absent}"
-            findings.append(Finding(path, text))
-        if self._twice:
-            raise RecordingError(str(path), self._crank, self._twice)
-        if self._missing:
-            text = f"is not among the joints of {self._missing} messages; they have"
-            text = f"{text} {listed(sorted(self._names))}"
-            if not self._found:
-                remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
-                raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
-            text = f"joint {self._crank} {text}; {self._found} messages have it"
-            findings.append(Finding(path, text, Severity.NOTE))
-        return findings
-
-
-def _raw(piece: Piece, message: np.void) -> bytes:
-    return piece.data[message["begin"] : message["end"]].tobytes()
 
 
 # Pauses between recordings that are replayed together: time without recording, not an input fault.
@@ -263,7 +190,6 @@ def clock_steps(path: Path, times_ns: NDArray[np.int64]) -> tuple[NDArray[np.boo
 
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # smallest intended number of samples in a block
-_COMPARED = 100  # wrenches per file to compare the axes
 _FAR_NS = 1_000_000_000  # difference between header stamps and log times
 
 
@@ -313,8 +239,7 @@ class Recording:
         self._last_ns = dict[int, NDArray[np.int64]]()
         self._decoder = Decoder(config)
         bag_files, self._findings = bag.find_files(paths), list[Finding]()
-        self._axis = WrenchAxis(config.drive_torque.axis)
-        self._joints = JointNames(config.crank_joint, wanted_interfaces(config))
+        self._crank, self._checks = config.crank_joint, MessageChecks(config)
         with ExitStack() as stack:
             self._sources, lost = bag.open_sources(bag_files, config, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
@@ -369,14 +294,26 @@ class Recording:
             for block in self._joined():
                 self._note_clock_steps(block)
                 yield from self._pauses.cut(block)
-        self._findings += self._joints.findings(self.files[0])
-        other_axis, apart_ns = self._axis.report(), self._apart_ns or 0
-        self._findings += [Finding(self.files[0], other_axis)] if other_axis else []
+        self._report_checks(self.files[0])
+        apart_ns = self._apart_ns or 0
         for topic in self._unstamped:
             if topic in self.topics and abs(apart_ns) > _FAR_NS:
                 text = f"{topic} has no header, so its stamps are log times; they are {apart_ns / 1e9:.6g} s"
                 text += " after the header stamps of joint_states; try --time log"
                 self._findings.append(Finding(self.files[0], text, Severity.NOTE))
+
+    def _report_checks(self, path: Path) -> None:
+        checks = self._checks
+        if checks.crank_fault:
+            raise RecordingError(str(path), self._crank, checks.crank_fault)
+        if checks.missing:
+            text = f"joint {self._crank} is not in {checks.missing} messages; {checks.found} messages have it"
+            self._findings.append(Finding(path, text, Severity.NOTE))
+        if checks.interface_fault:
+            text = f"{checks.lacking} messages of dynamic_joint_states: {checks.interface_fault}"
+            self._findings.append(Finding(path, text))
+        if checks.axis_fault:
+            self._findings.append(Finding(path, checks.axis_fault))
 
     def _note_clock_steps(self, block: Block) -> None:
         cranks = (block.samples["kind"] == CRANK) & (block.samples["fault"] == NO_FAULT)
@@ -423,10 +360,7 @@ class Recording:
         samples = self._decoder.many(piece.data, piece.messages)
         kinds, good = piece.messages["type"], samples["fault"] == NO_FAULT
         self._findings += clock_steps(bag_file.path, piece.messages["log_time_ns"][kinds == JOINT_STATE])[1]
-        self._joints.add_samples(piece, samples)
-        wrenches = np.flatnonzero(good & (kinds == WRENCH_STAMPED))
-        some = piece.messages[wrenches[:: max(1, len(wrenches) // _COMPARED)]]
-        self._axis.add(_raw(piece, one) for one in some)
+        self._checks.add(kinds, samples, piece.raw)
         for first in np.flatnonzero(good & (kinds == JOINT_STATE))[:1] if self._apart_ns is None else ():
             self._apart_ns = int(piece.messages["log_time_ns"][first] - samples["stamp_ns"][first])
         if self.time != "header":

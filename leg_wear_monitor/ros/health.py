@@ -3,21 +3,24 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 import attrs
+import numpy as np
 
-from leg_wear_monitor.monitor import alarm_specs, alarms
-from leg_wear_monitor.monitor.alarm_specs import AHEAD, SILENCE
+from leg_wear_monitor.monitor import alarms
+from leg_wear_monitor.monitor.alarm_specs import SILENCE
 from leg_wear_monitor.monitor.alarms import INPUT_SILENCE, Alarm, Limit, has_changed
 from leg_wear_monitor.monitor.evaluation import AlarmBoard
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.ros.inputs import Inbox, InputTopic, refusals, several
+from leg_wear_monitor.ros.inputs import Inbox, InputTopic
 from leg_wear_monitor.ros.outputs import BlackBox
-from leg_wear_monitor.state import LegAlarm, Level
+from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK, KINDS
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
-_Alarm = TypeVar("_Alarm", Alarm, LegAlarm)
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 # Detection of silent inputs (no usable samples), which only the node can do because it has a clock.
 #
@@ -121,28 +124,17 @@ class Silence:
         )
 
 
-# Alarms that need a clock or the ROS graph: a silent input, stamps in the future, several publishers.
+# Alarms that need a clock: a silent input.
 
 
-AHEAD_FROM_S = 1.0  # larger than the usual clock differences within a network
 _SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S, is_latched=False)
-_AHEAD = Limit(AHEAD_FROM_S, 2.0 * AHEAD_FROM_S, is_latched=False)
-SOURCES = alarm_specs.SOURCES.kind
-_TWO_SOURCES = Limit(2.0, 2.0)
-_CRANK = KINDS[CRANK].name
-_LIMITS = {SILENCE: _SILENT, AHEAD: _AHEAD, SOURCES: _TWO_SOURCES}
-
-
-def sources_alarm(kind: str) -> Alarm:
-    """Name of the alarm for several publishers; for the crank, the monitor's alarm without a subject."""
-    return Alarm(kind=SOURCES, subject="" if kind == _CRANK else kind)
 
 
 class NodeAlarms(AlarmBoard):
-    """Alarms of the node, in addition to the monitor's alarms.
+    """Alarms of silent inputs, in addition to the monitor's alarms.
 
     The list of alarms contains them only while they are raised; otherwise live runs and replays publish the
-    same bytes. ``input_sources`` is also an alarm of the monitor; the higher level of both is published.
+    same bytes.
 
     Parameters
     ----------
@@ -151,9 +143,8 @@ class NodeAlarms(AlarmBoard):
     """
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
-        alarms = [Alarm(kind=each, subject=kind, unit="s") for each in (SILENCE, AHEAD) for kind in kinds]
-        alarms += [sources_alarm(kind) for kind in kinds]
-        super().__init__(alarms, {alarm.name: _LIMITS[alarm.kind] for alarm in alarms})
+        alarms = [Alarm(kind=SILENCE, subject=kind, unit="s") for kind in kinds]
+        super().__init__(alarms, {alarm.name: _SILENT for alarm in alarms})
 
     def changed(self, values: Mapping[str, float], stamp_ns: int) -> tuple[Alarm, ...]:
         """Evaluate values by alarm name; return the alarms whose published state has changed."""
@@ -166,40 +157,76 @@ class NodeAlarms(AlarmBoard):
         return tuple(alarm for alarm in self.alarms.values() if alarm.level is not Level.OK)
 
     def beside(self, alarms: AlarmList) -> AlarmList:
-        """Merge the monitor's alarms with the node's alarms."""
-        return attrs.evolve(alarms, alarms=with_worse(alarms.alarms, self.raised)) if self.raised else alarms
+        """The monitor's alarms and the node's alarms."""
+        return attrs.evolve(alarms, alarms=(*alarms.alarms, *self.raised)) if self.raised else alarms
 
 
-def with_worse(alarms: Iterable[_Alarm], own: Iterable[_Alarm]) -> tuple[_Alarm, ...]:
-    """Alarms, plus those of the node that are missing in them or have a higher level."""
-    named = {alarm.name: alarm for alarm in alarms}
-    named |= {one.name: one for one in own if one.name not in named or one.level > named[one.name].level}
-    return tuple(named.values())
+# Clocks: ROS time may stand still or be set back, and stamps may be ahead of it.
+#
+# A live leg cannot walk through the same time twice: samples whose time is already in the ledger come from a
+# clock that was reset, or from playback of a recording. If stamps agree with the node's own clock, the
+# samples are live and the clock was reset: simulation time restarted, the board has no hardware clock, or the
+# clock was set back. After a reboot, the same holds for stamps that are not calendar dates. The node cannot
+# decide any other case.
 
 
-# Check that ROS time advances.
-
-
+NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
+NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of a device
+_AHEAD_FROM_S = 1.0  # larger than the usual clock differences within a network
 _STANDS_FROM_S = 1.0
-_TURNED_BACK_S = 1.0
+_SET_BACK_NS = 10**9
+
+UNDECIDED = (
+    "the ledger contains the time of these samples already, so they are skipped and nothing is "
+    "monitored. For simulated samples, set use_sim_time: true; if the clock restarts with each start, "
+    "set ledger.skip_counted: false; for a recording, use replay, or no ledger"
+)
+BEGUN = "the clock of the samples has restarted: the ledger begins a new epoch"
+_FAULTS = {
+    alarms.CLOCK_MISSING: "use_sim_time is set, and no node publishes /clock",
+    alarms.CLOCK_STOPPED: "stands still: /clock has stopped",
+    alarms.ALREADY_COUNTED: UNDECIDED,
+    alarms.CLOCK_SET_BACK: "was set back; samples keep their own stamps",
+    alarms.STAMPS_AHEAD: "the stamps of the samples are ahead of the node's clock: synchronise the clocks of "
+    "both computers; otherwise the monitor skips later samples",
+}
+"""Faults of the clock, the most severe first; the last two are warnings."""
 
 
-def both_clocks(one: Status, other: Status) -> Status:
-    """Combine two statuses of the clock into one status with both faults."""
-    faults = [status for status in (one, other) if status.level is not Level.OK]
-    message = "; ".join(fault.message for fault in faults) or one.message
-    code = max(faults, key=lambda fault: fault.level).fault_code if faults else one.fault_code
-    return Status(one.name, max(one.level, other.level), message, one.values | other.values, code)
+class Clocks:
+    """Compares the clocks of samples, node and ledger; a clock that was reset begins an epoch of the ledger.
 
+    Parameters
+    ----------
+    monitor : WearMonitor
+    boot : str
+        Identifier of the computer's present boot.
+    """
 
-class ClockMonitor:
-    """Compares the node's clock with a monotonic clock."""
+    def __init__(self, monitor: "WearMonitor", boot: str) -> None:
+        self._monitor, self._is_other_boot = monitor, monitor.begin_run(boot)
+        self._ros_ns = self._changed_ns = self._noted_ns = 0
+        self._begun, self._left_out, self._reported, self._ahead_s = 0, 0, 0, 0.0
 
-    def __init__(self) -> None:
-        self._ros_ns = self._changed_ns = 0
+    def check(self, samples: Samples, ros_ns: int) -> None:
+        """Check samples at a time of the node's clock [ns], before they are passed to the monitor."""
+        sound = samples["fault"] == NO_FAULT
+        # otherwise the clock was set back after these samples had arrived
+        if ros_ns >= self._noted_ns and ros_ns > 0 and sound.any():
+            self._ahead_s = max(self._ahead_s, 1.0e-9 * (int(samples["stamp_ns"][sound].max()) - ros_ns))
+        self._noted_ns = ros_ns
+        known = self._monitor.counted(samples) & sound
+        if not known.any():
+            return
+        stamp_ns = int(samples["stamp_ns"][known][-1])
+        if abs(ros_ns - stamp_ns) <= NOW_NS or (self._is_other_boot and stamp_ns < NO_DATE_NS):
+            self._monitor.begin_epoch(stamp_ns, "clock")
+            self._begun += 1
+        else:
+            self._left_out += int(np.count_nonzero(known))
 
-    def status(self, ros_ns: int, steady_ns: int, is_simulated: bool, ahead_s: float = 0.0) -> Status:
-        """Present status of the clock.
+    def status(self, ros_ns: int, steady_ns: int, is_simulated: bool) -> Status:
+        """Present status of the clocks, and of the samples since the last status.
 
         Parameters
         ----------
@@ -207,30 +234,31 @@ class ClockMonitor:
             Present time of the node's clock and of a monotonic clock [ns].
         is_simulated : bool
             True if the node follows ``/clock``.
-        ahead_s : float
-            Largest lead of an input's stamps over the node's clock [s].
         """
-        since_ns, before = ros_ns - self._ros_ns, self._ros_ns
-        if since_ns or not self._changed_ns:
+        passed_ns, before_ns = ros_ns - self._ros_ns, self._ros_ns
+        if passed_ns or not self._changed_ns:
             self._ros_ns, self._changed_ns = ros_ns, steady_ns
         stands_s = (steady_ns - self._changed_ns) * 1.0e-9
-        values = {"stands_s": stands_s, "is_simulated": float(is_simulated), "stamps_ahead_s": ahead_s}
-        if is_simulated and not ros_ns:
-            message = "use_sim_time is set, and no node publishes /clock"
-            return Status("clock", Level.ERROR, message, values, alarms.CLOCK_MISSING)
-        if stands_s > _STANDS_FROM_S:
-            message = "stands still: /clock has stopped"
-            return Status("clock", Level.ERROR, message, values, alarms.CLOCK_STOPPED)
-        if before and since_ns < -1.0e9 * _TURNED_BACK_S:
-            message = "was set back; samples keep their own stamps"
-            return Status("clock", Level.WARN, message, values, alarms.CLOCK_SET_BACK)
-        if ahead_s >= AHEAD_FROM_S:
-            message = (
-                "the stamps of the samples are ahead of the node's clock: synchronise the clocks of both "
-                "computers; otherwise the monitor skips later samples"
-            )
-            return Status("clock", Level.WARN, message, values, alarms.STAMPS_AHEAD)
-        return Status("clock", Level.OK, "goes on", values)
+        found = {
+            alarms.CLOCK_MISSING: is_simulated and not ros_ns,
+            alarms.CLOCK_STOPPED: stands_s > _STANDS_FROM_S,
+            alarms.ALREADY_COUNTED: self._left_out > self._reported,
+            alarms.CLOCK_SET_BACK: bool(before_ns) and passed_ns < -_SET_BACK_NS,
+            alarms.STAMPS_AHEAD: self._ahead_s >= _AHEAD_FROM_S,
+        }
+        values = {
+            "stands_s": stands_s,
+            "is_simulated": float(is_simulated),
+            "stamps_ahead_s": self._ahead_s,
+            "left_out_samples": float(self._left_out),
+            "epochs_begun": float(self._begun),
+        }
+        self._reported, self._ahead_s = self._left_out, 0.0
+        code = next((code for code in _FAULTS if found[code]), "")
+        if not code:
+            return Status("clock", Level.OK, BEGUN if self._begun else "goes on", values)
+        level = Level.WARN if code in (alarms.CLOCK_SET_BACK, alarms.STAMPS_AHEAD) else Level.ERROR
+        return Status("clock", level, _FAULTS[code], values, code)
 
 
 # Status of the node itself for /diagnostics: load, message loss, recording.
@@ -335,7 +363,7 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
     for topic in topics:
         short = topic.name.rsplit("/", 1)[-1]
         silent_s = max(0, now_ns - topic.heard_ns) * 1.0e-9 if topic.heard_ns else math.nan
-        values[f"{short}_publishers"] = float(len(topic.publishers.fitting))
+        values[f"{short}_publishers"] = float(topic.publishers)
         values[f"{short}_silent_s"] = silent_s
         values[f"{short}_lost_messages"] = float(topic.lost)
         for at, fault in _faults(topic, silent_s, (now_ns - started_ns) * 1.0e-9):
@@ -347,26 +375,25 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
 
 def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
     """Faults of a topic with their levels."""
-    if refused := refusals(topic.publishers):
-        yield Level.ERROR, refused
     if silent_s > SILENT_FROM_S:
         yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
-    elif not topic.publishers.fitting and not topic.publishers.refused:
+    elif not topic.publishers:
         yield (
             Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN,
             "no node publishes it. Start its driver, or remap the topic",
         )
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
-        yield Level.ERROR, "has a publisher, but no message has arrived yet"
+        yield (
+            Level.ERROR,
+            "has a publisher, but no message has arrived. Compare its type and quality of service: "
+            f"ros2 topic info --verbose {topic.name}",
+        )
     if topic.lost > topic.lost_reported:
         yield Level.WARN, "messages are lost before they reach this node"
-    if topic.without_crank:
-        yield Level.ERROR, topic.without_crank
-    if topic.other_axis:
-        yield Level.ERROR, topic.other_axis
-    if len(topic.publishers.fitting) - topic.shared > 1 and (several_of := several(topic.publishers)):
-        at = Level.ERROR if topic.sources > 1 else Level.WARN
-        yield at, f"{several_of}. Expected one"
+    if topic.content_fault:
+        yield Level.ERROR, topic.content_fault
+    if topic.publishers > 1 and topic.stream.kind != CRANK:  # several nodes may publish joints of one robot
+        yield Level.WARN, f"{topic.publishers} publishers. Expected one"
 
 
 def recording_status(black_box: BlackBox) -> Status:

@@ -1,8 +1,6 @@
 """Inputs of the node: subscriptions, the queue of messages, checks of joint names."""
 
-import itertools
 import threading
-from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -11,27 +9,18 @@ import attrs
 import numpy as np
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.recordings.cdr import MESSAGE, Decoder
-from leg_wear_monitor.recordings.findings import listed
-from leg_wear_monitor.recordings.message_checks import is_without, names_in, twice, without_interface
-from leg_wear_monitor.recordings.streams import INTERFACES, JOINT_STATE, Stream, streams_of
+from leg_wear_monitor.recordings.streams import Stream, streams_of
 from leg_wear_monitor.twin import LOAD
-from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
+from leg_wear_monitor.twin.sample import Samples
 
 # Bounded queue of received messages that wait for the monitor; adding a message is cheap.
-
-
-# A message of seven joints has about 300 bytes, one of a hundred thousand joints 2.5 MB; messages taken
-# together are copied for decoding.
-HELD_BYTES = 64 * 2**20
-TAKEN_BYTES = 8 * 2**20
 
 
 class Arrival(NamedTuple):
@@ -50,8 +39,6 @@ class Inbox:
     decoder : Decoder
     limit : int
         Maximum number of messages. On overflow the older half is shed, so that the rest has no gaps.
-    limit_bytes : int
-        Maximum number of bytes, likewise; a larger single message is itself shed.
 
     Attributes
     ----------
@@ -61,11 +48,10 @@ class Inbox:
         Held while messages are added or removed; a caller that adds several in order holds it.
     """
 
-    def __init__(self, decoder: Decoder, limit: int, limit_bytes: int = HELD_BYTES) -> None:
+    def __init__(self, decoder: Decoder, limit: int) -> None:
         self.lock = threading.RLock()
-        self._decoder, self._limit, self._limit_bytes = decoder, limit, limit_bytes
+        self._decoder, self._limit = decoder, limit
         self._waiting: list[Arrival] = []
-        self._bytes = 0
         self._last_ns = 0
         self.received, self.shed = 0, 0
 
@@ -81,31 +67,21 @@ class Inbox:
         with self.lock:
             self._last_ns = max(now_ns, self._last_ns + 1)
             self.received += 1
-            if len(raw) > self._limit_bytes:
-                self.shed += 1
-                return
-            while len(self._waiting) >= self._limit or self._bytes + len(raw) > self._limit_bytes:
-                self._drop((len(self._waiting) + 1) // 2)
+            if len(self._waiting) >= self._limit:
+                older = (self._limit + 1) // 2
+                del self._waiting[:older]
+                self.shed += older
             self._waiting.append(Arrival(code, self._last_ns, raw))
-            self._bytes += len(raw)
-
-    def _drop(self, number: int) -> None:
-        self._bytes -= sum(len(one.raw) for one in self._waiting[:number])
-        del self._waiting[:number]
-        self.shed += number
 
     def delay_s(self, now_ns: int) -> float:
         """Waiting time of the oldest message [s]."""
         with self.lock:
             return max(0, now_ns - self._waiting[0].log_time_ns) * 1.0e-9 if self._waiting else 0.0
 
-    def take(self, most: int, most_bytes: int = TAKEN_BYTES) -> list[Arrival]:
-        """Remove and return the oldest messages within both limits; the first one may exceed `most_bytes`."""
+    def take(self, most: int) -> list[Arrival]:
+        """Remove and return the oldest messages, at most so many."""
         with self.lock:
-            ends = itertools.accumulate(len(one.raw) for one in self._waiting[:most])
-            number = max(1, sum(1 for end in ends if end <= most_bytes))
-            taken, self._waiting = self._waiting[:number], self._waiting[number:]
-            self._bytes -= sum(len(one.raw) for one in taken)
+            taken, self._waiting = self._waiting[:most], self._waiting[most:]
             return taken
 
     def decoded(self, arrivals: list[Arrival]) -> Samples:
@@ -117,99 +93,6 @@ class Inbox:
         messages["begin"][1:] = messages["end"][:-1]
         data = np.frombuffer(b"".join(arrival.raw for arrival in arrivals), np.uint8)
         return self._decoder.many(data, messages)
-
-
-# Check that messages contain the crank joint; otherwise report the joints they contain.
-
-
-_MOST_BYTES = 100_000
-_MOST_PUBLISHERS, _UNNAMED_OF_A_BLOCK = 8, 20
-
-
-class CrankNames:
-    """Searches messages for the name of the crank joint.
-
-    Several nodes may publish joints of one robot on one topic, so messages without the crank are a fault
-    only if no message has it.
-
-    Parameters
-    ----------
-    crank_joint : str
-    """
-
-    def __init__(self, crank_joint: str) -> None:
-        self._crank = crank_joint
-        self._named = 0
-        self._others: dict[tuple[str, ...], int] = {}
-        self._unnamed: set[tuple[str, ...]] = set()
-        self._report = ""
-
-    def note(self, arrivals: Sequence[Arrival], samples: Samples, now_ns: int) -> None:
-        """Record messages and the samples decoded from them, at a time [ns] of the monotonic clock."""
-        joint_states = np.array([one.code == JOINT_STATE for one in arrivals], bool)
-        unnamed = np.flatnonzero(joint_states & (samples["fault"] == MISSING_JOINT))
-        for i in unnamed.tolist()[-_UNNAMED_OF_A_BLOCK:]:
-            names = _names(arrivals[i].raw)
-            if names in self._others or len(self._others) < _MOST_PUBLISHERS:
-                self._others[names] = now_ns
-                self._unnamed.add(names)
-        self._named += int(np.count_nonzero(joint_states & (samples["fault"] == NO_FAULT)))
-
-    def others(self, since_ns: int) -> int:
-        """Number of different lists of joints without the crank that came since a time."""
-        return sum(at_ns >= since_ns for at_ns in self._others.values())
-
-    def report(self) -> str:
-        """Report that no message since the last call named the crank, and which joints they named.
-
-        Empty if a message named the crank; without any message, the report of the last call.
-        """
-        named, unnamed = self._named, self._unnamed
-        self._named, self._unnamed = 0, set()
-        if named:
-            self._report = ""
-        elif unnamed:
-            names = sorted({name for joints in unnamed for name in joints})
-            again = next(filter(None, (twice(joints, self._crank) for joints in unnamed)), "")
-            there = listed(names) if names else "too many to list"
-            text = f"no joint is named {self._crank!r}; the joints are {there}; set crank_joint"
-            self._report = again or text
-        return self._report
-
-
-def _names(raw: bytes) -> tuple[str, ...]:
-    """Joint names of a message; empty if there are too many."""
-    return tuple(names_in(raw)) if len(raw) <= _MOST_BYTES else ()
-
-
-class InterfaceNames:
-    """Searches messages for the wanted interfaces of the crank.
-
-    Parameters
-    ----------
-    crank_joint : str
-    interfaces : mapping of str to str
-        Interfaces returned by `wanted_interfaces`.
-    """
-
-    def __init__(self, crank_joint: str, interfaces: Mapping[str, str]) -> None:
-        self._crank, self._interfaces = crank_joint, interfaces
-        self._without = b""
-
-    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
-        """Record messages and the samples decoded from them."""
-        of_interfaces = np.array([one.code == INTERFACES for one in arrivals], bool)
-        without = np.flatnonzero(of_interfaces & is_without(samples, self._interfaces))
-        if of_interfaces.any():
-            self._without = arrivals[without[-1]].raw if len(without) else b""
-
-    def report(self) -> str:
-        """Report interfaces that the last messages lack, and those that exist; empty if none is missing."""
-        if not self._without:
-            return ""
-        if len(self._without) > _MOST_BYTES:
-            return "too many joints to list"
-        return without_interface(self._without, self._crank, self._interfaces)
 
 
 # Message classes by the names of their types.
@@ -232,84 +115,10 @@ def message_class(name: str) -> Any:
     return getattr(found, message)
 
 
-# Publishers of an input: node names, publishers of a different type, several publishers of one crank.
+# Inputs that simulation time cannot stamp.
 
 
 _STAMPED = "wrench, effort or interface"
-_UNKNOWN = ("", "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_")
-
-
-@attrs.frozen
-class Publishers:
-    """Publishers of a topic according to the ROS graph.
-
-    Attributes
-    ----------
-    fitting : tuple of str
-        Full names of the nodes whose messages arrive.
-    refused : tuple of (str, str)
-        Full names of the other nodes, and why none of their messages arrives.
-    """
-
-    fitting: tuple[str, ...] = ()
-    refused: tuple[tuple[str, str], ...] = ()
-
-
-def publishers_of(node: Node, topic: str, expected: str, qos: QoSProfile) -> Publishers:
-    """Publishers of a topic in the graph. Events do not report publishers that disappear; the graph does.
-
-    Parameters
-    ----------
-    node : rclpy.node.Node
-    topic : str
-        Full name of the topic.
-    expected : str
-        Expected type, such as ``sensor_msgs/msg/JointState``.
-    qos : QoSProfile
-        Quality of service of the subscription.
-    """
-    there = node.get_publishers_info_by_topic(topic)
-    found = [(_full_name(one), _refusal(one, expected, qos)) for one in there]
-    return Publishers(
-        tuple(sorted(name for name, why in found if not why)),
-        tuple(sorted((name, why) for name, why in found if why)),
-    )
-
-
-def _refusal(publisher: TopicEndpointInfo, expected: str, qos: QoSProfile) -> str:
-    """Why no message of a publisher arrives; empty if they do."""
-    if publisher.topic_type != expected:
-        return f"publishes {publisher.topic_type}. Expected {expected}"
-    compatibility, why = qos_check_compatible(publisher.qos_profile, qos)
-    if compatibility != QoSCompatibility.ERROR:
-        return ""
-    reason = why.removeprefix("ERROR:").strip(" ;")
-    return f"has a lower quality of service than this node requests ({reason}); see qos_overrides"
-
-
-def _full_name(info: object) -> str:
-    name, space = getattr(info, "node_name", ""), getattr(info, "node_namespace", "")
-    return "a publisher without a node" if name in _UNKNOWN else f"{space.rstrip('/')}/{name}"
-
-
-def refusals(publishers: Publishers) -> str:
-    """Fault text for publishers without any arriving message; empty if there are none."""
-    listed = _listed(f"{name} {why}" for name, why in publishers.refused)
-    who = "it" if len(publishers.refused) == 1 else "them"
-    return f"{listed}; no message arrives from {who}" if listed else ""
-
-
-def several(publishers: Publishers) -> str:
-    """Fault text for several publishers; empty if there is at most one."""
-    number = len(publishers.fitting)
-    return f"{number} publishers: {_listed(publishers.fitting)}" if number > 1 else ""
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(dict.fromkeys(names))
-
-
-# Inputs that simulation time cannot stamp.
 
 
 def check_stamps(config: MonitorConfig, source: str) -> None:
@@ -341,11 +150,6 @@ def check_stamps(config: MonitorConfig, source: str) -> None:
 DEPTH = 10_000
 
 
-def _best_effort() -> QoSProfile:
-    """Profile of a subscription before its overrides, which rclpy writes into the profile itself."""
-    return QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
 @attrs.define
 class InputTopic:
     """A subscription and its faults.
@@ -361,18 +165,10 @@ class InputTopic:
     lost, lost_reported : int
         Messages lost in transport according to the middleware, and how many of them have already been
         reported.
-    publishers : Publishers
-        Publishers at the last query of the graph.
-    sources : int
-        Number of publishers that certainly send the expected data; 1 while this is unknown.
-    without_crank : str
-        Report on messages without the crank, or without its interface; empty if there are none.
-    other_axis : str
-        Report on a torque about a different axis than the axis that is read; empty if there is none.
-    shared : int
-        Number of different lists of joints without the crank; stands for the number of their publishers.
-    qos : QoSProfile
-        Quality of service of the subscription.
+    publishers : int
+        Number of publishers at the last query of the graph.
+    content_fault : str
+        Why the content of the messages is not that which is read; empty if it is.
     """
 
     name: str
@@ -381,12 +177,8 @@ class InputTopic:
     heard_wall_ns: int = 0
     lost: int = 0
     lost_reported: int = 0
-    publishers: Publishers = Publishers()
-    sources: int = 1
-    without_crank: str = ""
-    other_axis: str = ""
-    shared: int = 0
-    qos: QoSProfile = attrs.field(factory=_best_effort)
+    publishers: int = 0
+    content_fault: str = ""
 
 
 class Inputs:
@@ -443,7 +235,7 @@ def _subscribe(node: Node, topic: InputTopic) -> Subscription:
         message_class(topic.stream.type),
         topic.stream.topic,
         must_not_be_called,
-        topic.qos,  # with the overrides of parameters from here on
+        QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
         raw=True,
         event_callbacks=SubscriptionEventCallbacks(message_lost=lost),
         qos_overriding_options=QoSOverridingOptions.with_default_policies(),

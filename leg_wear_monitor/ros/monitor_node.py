@@ -18,44 +18,24 @@ from std_srvs.srv import Trigger
 from leg_wear_monitor.dynamics.clearance.stepper import advance_beside
 from leg_wear_monitor.errors import LegWearError, closed_on_interrupt
 from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
-from leg_wear_monitor.monitor.alarms import ADVICE, ALREADY_COUNTED
+from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
-from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports, Status
+from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.outputs import Messages
 from leg_wear_monitor.recordings.streams import SENSOR_DATA, STREAMS
-from leg_wear_monitor.ros.health import Load, load_status, recording_status
+from leg_wear_monitor.ros.health import Clocks, Load, load_status, recording_status
 from leg_wear_monitor.ros.inputs import Inbox, Inputs, check_stamps
 from leg_wear_monitor.ros.measure import measured, not_stored, offer_measure, with_storage
 from leg_wear_monitor.ros.outputs import BlackBox, MarkerTopic, Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, release_memory, repeated, run, spin
 from leg_wear_monitor.ros.supervision import Supervision
-from leg_wear_monitor.state import Level
-from leg_wear_monitor.twin.sample import NO_FAULT, Samples
-
-# Samples whose time is already in the ledger: the clock was reset, or a recording is played back.
-#
-# A live leg cannot walk through the same time twice. If stamps agree with the node's own clock, the samples
-# are live and the clock was reset: simulation time restarted, the board has no hardware clock, or the clock
-# was set back. After a reboot, the same holds for stamps that are not calendar dates. Any other samples may
-# come from playback of a recording whose wear is already in the ledger; the node cannot decide this case.
-
-
-NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
-NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of a device
-
-UNDECIDED = (
-    "the ledger contains the time of these samples already, so they are skipped and nothing is "
-    "monitored. For simulated samples, set use_sim_time: true; if the clock restarts with each start, "
-    "set ledger.skip_counted: false; for a recording, use replay, or no ledger"
-)
-BEGUN = "the clock of the samples has restarted: the ledger begins a new epoch"
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -66,52 +46,6 @@ def boot_id() -> str:
         return _BOOT_ID.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError):
         return ""
-
-
-class Epochs:
-    """Detects clock resets, and reports samples for which a reset is undecidable.
-
-    Parameters
-    ----------
-    monitor : WearMonitor
-    boot : str
-        See `boot_id`.
-    now_ns : callable
-        The node's clock [ns].
-    report : callable
-        Called with whether it is an error, and a line: at each clock reset, and at the first undecidable one.
-    """
-
-    def __init__(
-        self, monitor: WearMonitor, boot: str, now_ns: Callable[[], int], report: Callable[[bool, str], None]
-    ) -> None:
-        self._monitor, self._now_ns, self._report = monitor, now_ns, report
-        self._is_other_boot = monitor.begin_run(boot)
-        self._begun, self._left_out, self._reported = 0, 0, 0
-
-    def check(self, samples: Samples) -> None:
-        """Check samples before they are passed to the monitor."""
-        known = self._monitor.counted(samples) & (samples["fault"] == NO_FAULT)
-        if not known.any():
-            return
-        stamp_ns = int(samples["stamp_ns"][known][-1])
-        is_now = abs(self._now_ns() - stamp_ns) <= NOW_NS
-        if is_now or (self._is_other_boot and stamp_ns < NO_DATE_NS):
-            self._monitor.begin_epoch(stamp_ns, "clock")
-            self._begun += 1
-            self._report(False, BEGUN)
-            return
-        if not self._left_out:
-            self._report(True, UNDECIDED)
-        self._left_out += int(np.count_nonzero(known))
-
-    def status(self) -> Status:
-        """Clock status: an error if samples were left out since the last call."""
-        values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
-        is_undecided, self._reported = self._left_out > self._reported, self._left_out
-        if is_undecided:
-            return Status("clock", Level.ERROR, UNDECIDED, values, ALREADY_COUNTED)
-        return Status("clock", Level.OK, BEGUN if self._begun else "continues", values)
 
 
 # Helpers of the operator services: confirmation, audit time, reply texts.
@@ -199,7 +133,8 @@ class MonitorNode(ClosingNode):
         self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
-        if self.get_parameter("use_sim_time").value:
+        self._is_simulated = bool(self.get_parameter("use_sim_time").value)
+        if self._is_simulated:
             check_stamps(parameters.config, self.get_fully_qualified_name())
         log = self.get_logger()
         log.info("preparing: the first start compiles numerical kernels (half a minute on two processors)")
@@ -234,7 +169,7 @@ class MonitorNode(ClosingNode):
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
-        self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
+        self._clocks = Clocks(self._monitor, boot_id())
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path, self.get_logger().info)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
@@ -299,10 +234,6 @@ class MonitorNode(ClosingNode):
         """Present ROS time [ns]."""
         return self.get_clock().now().nanoseconds
 
-    def _report(self, is_error: bool, line: str) -> None:
-        logger = self.get_logger()
-        logger.error(line) if is_error else logger.warning(line)
-
     def _take(self, inputs: Inputs) -> None:
         """Take the messages that came, and process them, for no longer than until the next turn."""
         now_ns = self._turn()
@@ -339,7 +270,7 @@ class MonitorNode(ClosingNode):
                 row = np.frombuffer(arrival.raw, np.uint8)[None, :]
                 self._black_box.write(names[arrival.code], arrival.log_time_ns, row)
         samples = self._inbox.decoded(arrivals)
-        self._epochs.check(samples)
+        self._clocks.check(samples, self._ros_now_ns())
         self._monitor.note_late(self._load.is_late(time.monotonic_ns()))
         reports = self._monitor.update(samples)
         self._supervision.note(arrivals, samples)
@@ -381,7 +312,7 @@ class MonitorNode(ClosingNode):
             *self._monitor.status(),
             load_status(self._load, self._inbox, self._black_box.on),
             recording_status(self._black_box),
-            self._epochs.status(),
+            self._clocks.status(self._ros_now_ns(), turn_ns, self._is_simulated),
         )
         message = self._messages.diagnostics(self._ros_now_ns(), self._supervision.statuses(status))
         self._outlets.send(message, now_ns)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -19,7 +20,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.recordings.cdr import Decoder
-from leg_wear_monitor.recordings.message_checks import wanted_interfaces
+from leg_wear_monitor.recordings.message_checks import MessageChecks
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.state import State
 
@@ -133,7 +134,6 @@ def test_an_opened_knee_is_shown_by_the_current_in_the_air(stage: Any, stand_ins
 
 def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> None:
     config = load_config(EXAMPLE / "monitor.yaml")
-    names = inputs.InterfaceNames("leg_crank", wanted_interfaces(config))
     box = inputs.Inbox(Decoder(config), 10)
     has_no = "leg_crank has no interface"
     for joint, there, report in (
@@ -158,8 +158,10 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
     ):
         box.add(inputs.INTERFACES, dynamic_joint_state(1, {joint: there}), 1)
         arrivals = box.take(1)
-        names.note(arrivals, box.decoded(arrivals))
-        assert names.report() == report
+        checks = MessageChecks(config)
+        codes = np.array([one.code for one in arrivals])
+        checks.add(codes, box.decoded(arrivals), lambda i, arrivals=arrivals: arrivals[i].raw)
+        assert checks.interface_fault == report
 
 
 def test_without_control_msgs_a_line_names_the_parameter_and_the_package(

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -11,7 +10,7 @@ from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motio
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.mechanism.urdf import joint_positions
 from leg_wear_monitor.monitor import alarm_specs
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, SampleReports, VerdictReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, VerdictReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recordings import encode
 from leg_wear_monitor.recordings.encode import LINE_LIST, SPHERE, TEXT, Marker
@@ -22,15 +21,13 @@ MARKERS = Output("~/markers", encode.MARKER_ARRAY)
 LINKAGE = Output("~/linkage_states", encode.JOINT_STATE)
 """Joint positions of its robot description (`leg-wear-monitor draw --urdf`), for the ideal leg."""
 
-SILENT_NS = 1_000_000_000  # samples apart by more: there was no current data
 _PERIOD_NS = 100_000_000
-_NEVER_NS = 2**63 - 1
 _STEPS = 180  # positions per turn; the nearest position is drawn
 
 # Okabe and Ito's colours, because colour-blind people can distinguish them; the text has the levels as well
 _COLOURS = {Level.OK: (0.0, 0.45, 0.70), Level.WARN: (0.90, 0.62, 0.0), Level.ERROR: (0.84, 0.37, 0.0)}
 _SIZES = {Level.OK: 0.03, Level.WARN: 0.042, Level.ERROR: 0.054}
-_GREY, _BODIES, _TEXTS = (0.55, 0.55, 0.55), (0.60, 0.62, 0.68), (0.90, 0.90, 0.90)
+_BODIES, _TEXTS = (0.60, 0.62, 0.68), (0.90, 0.90, 0.90)
 _LINE, _TEXT, _SAME = 0.008, 0.04, 1.0e-3  # as fractions of the leg's size
 
 
@@ -96,18 +93,8 @@ class LegDrawing:
         return round(crank_angle / TURN * _STEPS) % _STEPS
 
 
-@attrs.frozen
-class _Shown:
-    """Values that the markers show in addition to the motion; joints in the order of the leg."""
-
-    levels: tuple[Level, ...]
-    clearances_m: tuple[float, ...]
-    verdict: str
-    is_current: bool
-
-
 class LegMarkers:
-    """Messages of `MARKERS` and `LINKAGE`, the same live and in replay; grey while the leg is not tracked.
+    """Messages of `MARKERS` and `LINKAGE` while the leg is tracked, the same live and in replay.
 
     Parameters
     ----------
@@ -120,11 +107,10 @@ class LegMarkers:
     def __init__(self, monitor: WearMonitor, drawing: LegDrawing) -> None:
         self._drawing, self._frame_id = drawing, monitor.config.frame_id
         self._joints = monitor.clearance_joints
-        self._now = _Shown(
-            self._levels(monitor.alarms), monitor.clearances_m, _words(monitor.verdict), is_current=False
-        )
+        self._shown_levels, self._clearances_m = self._levels(monitor.alarms), monitor.clearances_m
+        self._verdict = _words(monitor.verdict)
         self._changes: list[AlarmList | CycleReport | VerdictReport] = []
-        self._last_ns, self._step = 0, 0
+        self._last_ns = 0
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
         """Messages at the first sample of each tenth of a second."""
@@ -133,49 +119,31 @@ class LegMarkers:
         before_ns = np.concatenate([[self._last_ns], samples.stamp_ns[:-1]])
         for i in np.flatnonzero(samples.stamp_ns // _PERIOD_NS != before_ns // _PERIOD_NS).tolist():
             stamp_ns = int(samples.stamp_ns[i])
-            if stamp_ns < before_ns[i]:  # the clock was set back, so later changes are from before
-                self._take(int(samples.stamp_ns[-1]) + 1, _NEVER_NS)
-            elif 0 < before_ns[i] < stamp_ns - SILENT_NS:
-                yield self.no_data(int(before_ns[i]) + SILENT_NS)
-            self._take(0, stamp_ns)
-            yield from self._at(samples, i)
+            self._take(stamp_ns, int(samples.stamp_ns[-1]))
+            if math.isfinite(angle := float(samples.crank_angle_rad[i])):
+                yield from self._at(stamp_ns, self._drawing.step_at(angle))
         if len(samples):
             self._last_ns = int(samples.stamp_ns[-1])
 
-    def no_data(self, stamp_ns: int) -> Outgoing:
-        """The leg at its last position, in grey."""
-        self._now = attrs.evolve(self._now, is_current=False)
-        return self._drawn(stamp_ns)
-
-    def set_state(self, alarms: AlarmList, verdict: VerdictReport) -> None:
-        """Set alarms and verdict immediately after an action of an operator."""
-        self._now = attrs.evolve(self._now, levels=self._levels(alarms), verdict=_words(verdict))
-
-    def _at(self, samples: SampleReports, i: int) -> Iterator[Outgoing]:
-        angle, stamp_ns = float(samples.crank_angle_rad[i]), int(samples.stamp_ns[i])
-        if math.isnan(angle):
-            yield self.no_data(stamp_ns)
-            return
-        self._step = self._drawing.step_at(angle)
-        self._now = attrs.evolve(self._now, is_current=True)
-        yield self._drawn(stamp_ns)
-        position = self._drawing.link_positions[self._step]
+    def _at(self, stamp_ns: int, step: int) -> Iterator[Outgoing]:
+        raw = encode.marker_array(stamp_ns, list(self._markers(step)), self._frame_id)
+        yield single(MARKERS, stamp_ns, raw)
+        position = self._drawing.link_positions[step]
         rows = encode.joint_states(stamp_ns, self._drawing.links, position=position, frame_id=self._frame_id)
         yield single(LINKAGE, stamp_ns, rows[0].tobytes())
 
-    def _take(self, begin_ns: int, end_ns: int) -> None:
-        """Show the changes with stamps between the two given stamps; later changes wait."""
+    def _take(self, stamp_ns: int, newest_ns: int) -> None:
+        """Show the changes before a stamp, and those of a clock that was set back, after the newest sample."""
         waiting = []
         for change in self._changes:
-            if not begin_ns <= change.stamp_ns < end_ns:
+            if stamp_ns <= change.stamp_ns <= newest_ns:
                 waiting.append(change)
             elif isinstance(change, AlarmList):
-                self._now = attrs.evolve(self._now, levels=self._levels(change))
+                self._shown_levels = self._levels(change)
             elif isinstance(change, VerdictReport):
-                self._now = attrs.evolve(self._now, verdict=_words(change))
+                self._verdict = _words(change)
             else:
-                clearances_m = tuple(joint.clearance_m for joint in change.joints)
-                self._now = attrs.evolve(self._now, clearances_m=clearances_m)
+                self._clearances_m = tuple(joint.clearance_m for joint in change.joints)
         self._changes = waiting
 
     def _levels(self, alarms: AlarmList) -> tuple[Level, ...]:
@@ -186,33 +154,31 @@ class LegMarkers:
             for joint in self._joints
         )
 
-    def _drawn(self, stamp_ns: int) -> Outgoing:
-        raw = encode.marker_array(stamp_ns, list(self._markers(self._now)), self._frame_id)
-        return single(MARKERS, stamp_ns, raw)
-
-    def _markers(self, now: _Shown) -> Iterator[Marker]:
-        size, joints = self._drawing.size, self._drawing.joints[self._step]
+    def _markers(self, step: int) -> Iterator[Marker]:
+        size, joints = self._drawing.size, self._drawing.joints[step]
         above = np.array([0.0, 0.0, 0.8 * _TEXT * size])
         yield Marker(
             namespace="bodies",
             type=LINE_LIST,
             scale=(_LINE * size, 0.0, 0.0),
-            colour=_BODIES if now.is_current else _GREY,
-            points=self._drawing.lines[self._step],
+            colour=_BODIES,
+            points=self._drawing.lines[step],
         )
-        for k, level in enumerate(now.levels):
+        for k, level in enumerate(self._shown_levels):
             yield Marker(
                 namespace="joints",
                 id=k,
                 type=SPHERE,
                 scale=(_SIZES[level] * size,) * 3,
-                colour=_COLOURS[level] if now.is_current else _GREY,
+                colour=_COLOURS[level],
                 position=joints[k],
             )
         for k, name in self._drawing.tags.items():
             yield self._text("names", k, name, joints[k] + above)
-        lines = [now.verdict if now.is_current else "no current data"]
-        for joint, level, clearance_m in zip(self._joints, now.levels, now.clearances_m, strict=True):
+        lines = [self._verdict]
+        for joint, level, clearance_m in zip(
+            self._joints, self._shown_levels, self._clearances_m, strict=True
+        ):
             lines.append(f"{joint}: {level.name} {1.0e3 * clearance_m:.3f} mm")
         yield self._text("verdict", 0, "\n".join(lines), self._drawing.title)
 
@@ -222,7 +188,7 @@ class LegMarkers:
             id=number,
             type=TEXT,
             scale=(0.0, 0.0, _TEXT * self._drawing.size),
-            colour=_TEXTS if self._now.is_current else _GREY,
+            colour=_TEXTS,
             position=position,
             text=text,
         )

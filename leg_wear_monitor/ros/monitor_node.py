@@ -181,7 +181,7 @@ class MonitorNode(ClosingNode):
         self._confirmation = Confirmation()
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
-        self._markers = MarkerTopic(self, self._outlets, self._monitor, lambda: self._supervision.is_current)
+        self._markers = MarkerTopic(self._outlets, self._monitor)
         self._send_state()
         inputs = self._inputs = Inputs(self, config)
         self._supervision.inputs = inputs.topics
@@ -348,7 +348,7 @@ class MonitorNode(ClosingNode):
     def _acknowledge(self) -> str:
         cleared, kept = self._monitor.acknowledge(self._ros_now_ns())
         own_cleared, own_kept = self._supervision.acknowledge()
-        self._markers.operated()
+        self._markers.forget()
         cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
         self._send_state()
         return with_storage(alarm_words(cleared, kept), not_stored(self._monitor))
@@ -359,7 +359,7 @@ class MonitorNode(ClosingNode):
 
     def _measure(self, wanted: dict[str, Any]) -> str:
         text = measured(self._monitor, wanted, audit_time(self._ros_now_ns()))
-        self._markers.operated()
+        self._markers.forget()
         self._send_state_and_forecast()
         return text
 

@@ -13,8 +13,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -26,7 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS, SILENT_NS, LegDrawing, LegMarkers
+from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS, LegDrawing, LegMarkers
 from leg_wear_monitor.recordings.streams import Outgoing, Output, Qos
 from leg_wear_monitor.ros.running import until_down
 
@@ -204,53 +202,31 @@ class MarkerTopic:
 
     Parameters
     ----------
-    node : rclpy.node.Node
     outlets : Outlets
     monitor : WearMonitor
-    is_current : callable
-        Returns whether there are current data; otherwise the leg is published in grey, once a second.
     """
 
-    def __init__(
-        self, node: Node, outlets: Outlets, monitor: WearMonitor, is_current: Callable[[], bool]
-    ) -> None:
-        self._node, self._outlets, self._monitor, self._is_current = node, outlets, monitor, is_current
-        self._markers: LegMarkers | None = None
-        if self._is_wanted:
-            self._markers = LegMarkers(monitor, self._drawing)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(SILENT_NS * 1.0e-9, self._show_silence, clock=steady)
+    def __init__(self, outlets: Outlets, monitor: WearMonitor) -> None:
+        self._outlets, self._monitor = outlets, monitor
+        self._markers = LegMarkers(monitor, self._drawing) if self._is_wanted else None
 
     def publish(self, reports: Reports) -> None:
-        """Publish the markers of reports."""
-        for outgoing in self._drawn.of(reports) if self._is_wanted else ():
-            self._send(outgoing)
+        """Publish the markers of reports; without a listener, their content is not kept up to date."""
+        if not self._is_wanted:
+            self.forget()
+            return
+        self._markers = self._markers or LegMarkers(self._monitor, self._drawing)
+        for outgoing in self._markers.of(reports):
+            self._outlets.send(outgoing, time.time_ns())
 
-    def operated(self) -> None:
-        """Show alarms and verdict that an operator has changed."""
-        if self._markers:
-            self._markers.set_state(self._monitor.alarms, self._monitor.verdict)
+    def forget(self) -> None:
+        """Begin again with the present state, after an operator has changed it."""
+        self._markers = None
+
+    @property
+    def _is_wanted(self) -> bool:
+        return self._monitor.config.publish_markers and any(map(self._outlets.wanted, (MARKERS, LINKAGE)))
 
     @cached_property
     def _drawing(self) -> LegDrawing:
         return LegDrawing(self._monitor.mechanism)
-
-    @property
-    def _drawn(self) -> LegMarkers:
-        self._markers = self._markers or LegMarkers(self._monitor, self._drawing)
-        return self._markers
-
-    @property
-    def _is_wanted(self) -> bool:
-        """True if markers are needed; otherwise their content is not kept up to date."""
-        wanted = self._monitor.config.publish_markers and any(map(self._outlets.wanted, (MARKERS, LINKAGE)))
-        if not wanted:
-            self._markers = None
-        return wanted
-
-    def _show_silence(self) -> None:
-        if not self._is_current() and self._is_wanted:
-            self._send(self._drawn.no_data(self._node.get_clock().now().nanoseconds))
-
-    def _send(self, outgoing: Outgoing) -> None:
-        self._outlets.send(outgoing, time.time_ns())

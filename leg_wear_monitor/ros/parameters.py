@@ -2,18 +2,14 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.publisher import Publisher
-from rclpy.subscription import Subscription
 
-from leg_wear_monitor.errors import ConfigError, did_you_mean
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.parameters import (
     Parameter,
     changed,
@@ -36,7 +32,6 @@ _ARRAYS = (
 
 _CLOCK = "use_sim_time"
 _QOS_OVERRIDES = "qos_overrides."
-_MOST_DEPTH = 2**31 - 1  # limit of DDS
 # YAML 1.1 reads 1e-06 as text, and Python prints 0.000001 like this
 _NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")
 
@@ -53,78 +48,14 @@ class ParameterNode(Node):
     fault_of : callable
         Reason why parameters cannot be set, empty if they can. Called before rclpy, which would name neither
         unit nor bounds of a value that is out of range.
-
-    Raises
-    ------
-    ConfigError
-        If a parameter of rclpy itself, such as ``use_sim_time``, has a wrong type.
     """
 
     fault_of: Callable[[list[RosParameter]], str] = staticmethod(lambda _: "")
-
-    def __init__(self, name: str, **options: Any) -> None:
-        try:
-            super().__init__(name, **options)
-        except ParameterException as error:
-            raise ConfigError(f"/{name}", "", str(error)) from error
 
     @property
     def given(self) -> dict[str, Any]:
         """Parameter overrides by name, from files, arguments and the constructor; includes unknown names."""
         return {name: plain(one) for name, one in self._parameter_overrides.items()}
-
-    @property
-    def unused_qos(self) -> tuple[str, ...]:
-        """Given overrides of a quality of service that fit no topic, which rclpy would ignore."""
-        known = [name for name in self._parameters if name.startswith(_QOS_OVERRIDES)]
-        return tuple(
-            name + did_you_mean(name, known)
-            for name in self.given
-            if name.startswith(_QOS_OVERRIDES) and name not in known
-        )
-
-    def create_subscription(
-        self, msg_type: Any, topic: str, callback: Callable[[Any], None], *options: Any, **named: Any
-    ) -> Subscription:
-        """Create a subscription.
-
-        Raises
-        ------
-        ConfigError
-            If the quality of service that parameters set for this topic cannot be used.
-        """
-        with self._qos_checked(topic):
-            return super().create_subscription(msg_type, topic, callback, *options, **named)
-
-    def create_publisher(self, msg_type: Any, topic: str, *options: Any, **named: Any) -> Publisher:
-        """Create a publisher.
-
-        Raises
-        ------
-        ConfigError
-            If the quality of service that parameters set for this topic cannot be used.
-        """
-        with self._qos_checked(topic):
-            return super().create_publisher(msg_type, topic, *options, **named)
-
-    @contextmanager
-    def _qos_checked(self, topic: str) -> Iterator[None]:
-        """Name the parameters of an unusable quality of service, because the error of rclpy has no value."""
-        of_topic = f"{_QOS_OVERRIDES}{self.resolve_topic_name(topic)}."
-        given = {name: value for name, value in self.given.items() if name.startswith(of_topic)}
-        for name, value in given.items():
-            # otherwise the middleware and rclpy would print their own messages
-            if name.endswith(".depth") and isinstance(value, int) and not 0 <= value <= _MOST_DEPTH:
-                fault = f"{value} is not from 0 to {_MOST_DEPTH} messages"
-                raise ConfigError(self.get_fully_qualified_name(), name, fault)
-        try:
-            yield
-        except (ParameterException, RuntimeError) as error:
-            if not given:
-                raise
-            values = ", ".join(f"{name}: {value}" for name, value in given.items())
-            fault = f"{values} cannot be used: {str(error).split(', at /')[0]}"
-            raise ConfigError(self.get_fully_qualified_name(), "", fault) from error
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set parameters, all or none.

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -168,9 +169,7 @@ def _init(argv: list[str]) -> None:
 
 
 def _warn_of_unused(node: ParameterNode, argv: list[str]) -> None:
-    """Report parameter files and qualities of service that do not fit; ROS ignores them silently."""
-    for fault in node.unused_qos:
-        node.get_logger().warning(f"no topic of this node has the parameter {printable(fault)}")
+    """Report parameter files that are for other nodes; ROS ignores them silently."""
     name = node.get_fully_qualified_name()
     for option, path in itertools.pairwise(argv):
         if option != "--params-file":
@@ -236,7 +235,10 @@ def run(
         try:
             arguments = list(sys.argv if argv is None else argv)
             _init(arguments)
-            node = make()
+            try:
+                node = make()
+            except (ParameterException, _rclpy.RCLError) as error:  # a parameter of rclpy itself
+                raise ConfigError(arguments[0], "", str(error).split(", at /")[0]) from error
             _warn_of_unused(node, arguments)
             for number in _SIGNALS:
                 signal.signal(number, lambda *_: asked.set())

@@ -70,11 +70,6 @@ class Supervision:
         self._logged: dict[str, tuple[Level, str]] = {}
         self.inputs: Sequence[InputTopic] = ()
 
-    @property
-    def is_current(self) -> bool:
-        """True if usable crank samples are arriving."""
-        return self._silence.level(KINDS[CRANK].name, time.monotonic_ns()) is Level.OK
-
     def excuse(self, late_ns: int) -> None:
         """Exclude a time in which the node was late [ns] from the silence of its inputs."""
         self._silence.excuse(late_ns)

@@ -133,7 +133,7 @@ class LegMarkers:
         yield single(LINKAGE, stamp_ns, rows[0].tobytes())
 
     def _take(self, stamp_ns: int, newest_ns: int) -> None:
-        """Show the changes before a stamp, and those of a clock that was set back, after the newest sample."""
+        """Show the changes before a stamp; those after the newest sample are of a clock that was set back."""
         waiting = []
         for change in self._changes:
             if stamp_ns <= change.stamp_ns <= newest_ns:

@@ -45,7 +45,7 @@ BAGS: dict[str, dict[str, object]] = {
 }
 INPUTS_ONLY = ("ground",)  # the monitor's messages would be four fifths of a longer recording
 JOINT_STATES = "/joint_states"
-LEG = {"duration_s": 12.0, "seed": 4, "wait_for_subscribers": 1, "precompute": True}
+LEG = {"duration_s": 12.0, "seed": 4, "wait_for_subscribers": 1}
 PATIENCE_S = 300.0
 
 

@@ -24,7 +24,6 @@ def _not_negative(unit: str, doc: str, default: Any = 0.0, at_most: float | None
 
 
 _fraction = partial(_not_negative, "", at_most=1.0)
-_shift = partial(quantity, "", at_least=-0.3, at_most=0.3, default=0.0)
 
 
 def _at_most_four(names: tuple[str, ...]) -> str | None:
@@ -163,8 +162,6 @@ class LoadConfig:
         "shape of the ground's force: the monitor's template of stance, or a measured stance on a treadmill",
         default=TEMPLATE,
     )
-    heel_strike_shift: float = _shift("delay of the heel strike from its nominal phase, in gait cycles")
-    toe_off_shift: float = _shift("delay of the toe-off from its nominal phase, in gait cycles")
     amplitude_scatter: float = _fraction(
         "standard deviation of the ground's force from step to step, as a fraction of its mean",
         0.1,

@@ -102,15 +102,11 @@ class Ground:
 
 def _stance(mechanism: Mechanism, config: GaitConfig) -> Stance:
     """Stance of a leg that walks in the first direction of the crank."""
-    load, nominal = config.load, nominal_stance(build_linkage(mechanism))
+    nominal = nominal_stance(build_linkage(mechanism))
     if nominal.turned * next((rpm for rpm in config.pace.speeds_rpm if rpm), nominal.turned) < 0.0:
         ends = nominal.toe_off, nominal.heel_strike
         nominal = Stance(*ends, -nominal.turned, nominal.up, -nominal.back)
-    return attrs.evolve(
-        nominal,
-        heel_strike=nominal.heel_strike + nominal.turned * load.heel_strike_shift,
-        toe_off=nominal.toe_off + nominal.turned * load.toe_off_shift,
-    )
+    return nominal
 
 
 def _shape(load: LoadConfig, s: Floats) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header
 
 from leg_wear_monitor.configuration import described, quantity
-from leg_wear_monitor.errors import ConfigError, LegWearError, system_asked
+from leg_wear_monitor.errors import LegWearError, system_asked
 from leg_wear_monitor.files import json_text
 from leg_wear_monitor.gait.config import CONTACT, FLOAT64, GaitConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
@@ -60,9 +60,6 @@ class PublisherConfig(GaitConfig):
         "names of other joints in the message; they stand still", default=()
     )
     frame_id: str = described("frame of the torque", default="pelvis")
-    reliable: bool = described("publish reliably instead of with best effort", default=False)
-    time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
-    precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
         "",
         "number of subscribers per topic that the node waits for before it starts",
@@ -178,17 +175,11 @@ class GaitPublisher(ClosingNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("gait_publisher", **options)
         self.config = Parameters(self, PublisherConfig).config
-        if self.config.precompute and not self.config.duration_s:
-            raise ConfigError(self.get_fully_qualified_name(), "precompute", "needs a duration_s above 0 s")
         log = self.get_logger()
         log.info("preparing the leg; the first start compiles numerical kernels for a minute")
         with repeated(lambda passed_s: log.info(f"preparing the leg: {passed_s:.0f} s")):
             self._leg = SyntheticLeg(self.config)
-            self._blocks = self._walk()
-            if self.config.precompute:
-                self._blocks = iter(list(self._blocks))
-        policy = ReliabilityPolicy.RELIABLE if self.config.reliable else ReliabilityPolicy.BEST_EFFORT
-        qos = QoSProfile(depth=200, reliability=policy)
+        qos = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
         sources = {TORQUE: self.config.torque_sensor.source, LOAD: self.config.foot_load_sensor.source}
         self._by_kind: dict[int, Publisher] = {
             stream.kind: self._publisher(message_class(stream.type), stream.topic, qos)
@@ -202,20 +193,19 @@ class GaitPublisher(ClosingNode):
             self._walk_on(wanted)
 
     def _walk_on(self, wanted: Callable[[], bool]) -> None:
-        blocks = self._blocks if self.config.precompute else self._computed_ahead()
         while wanted() and not self._has_subscribers():
             time.sleep(0.02)
         self._start_ns, began = self.get_clock().now().nanoseconds, time.monotonic()
         self.get_logger().info("walking")
-        for reading in itertools.chain.from_iterable(blocks):
-            due = began + reading.arrival_s / self.config.time_scale
+        for reading in itertools.chain.from_iterable(self._computed_ahead()):
+            due = began + reading.arrival_s
             while (wait := due - time.monotonic()) > 0.0 and wanted():
                 time.sleep(min(wait, WAKE_S))
             if not wanted():
                 return
             if wait < -_LATE_S:
                 self.get_logger().warning(
-                    "the simulation is slower than the clock; lower rates or time_scale, or set precompute",
+                    "the simulation is slower than the clock; lower the rates",
                     throttle_duration_sec=5.0,
                 )
             message = sensor_message(reading, self._start_ns, self.config)
@@ -251,7 +241,7 @@ class GaitPublisher(ClosingNode):
 
         def compute() -> None:
             try:
-                for block in self._blocks:
+                for block in self._walk():
                     ready.put(block)
                 ready.put(None)
             except LegWearError as error:

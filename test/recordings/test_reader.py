@@ -639,9 +639,3 @@ def test_a_number_that_is_none_is_a_faulty_sample_and_an_empty_cell_is_no_sample
     samples, _ = read(tmp_path / "a.csv", config=config_from({}))
     assert samples["stamp_ns"].tolist() == [1_100_000_000, 1_200_000_000, 1_200_000_000, 1_300_000_000]
     assert (samples["fault"] != 0).tolist() == [True, False, True, False]
-
-
-def test_a_message_of_a_number_is_that_of_the_library(store):
-    kind = store.types["std_msgs/msg/Float64"]
-    raw = encode.float64s([1.5, -2.0])
-    assert bytes(raw[1]) == bytes(store.serialize_cdr(kind(-2.0), "std_msgs/msg/Float64"))

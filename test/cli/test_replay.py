@@ -162,8 +162,7 @@ def test_what_cannot_be_is_said_in_a_line(refused, bag, tmp_path, arguments, lin
 
 def test_a_crank_that_is_in_no_message_is_refused_with_the_names_that_are_there(refused):
     line = refused("replay", HEALTHY, "--crank-joint", "wheel", "--json", "-")
-    assert line.startswith(f"error: {HEALTHY}: wheel: is not among the joints of ")
-    assert "messages; they have crank; set the crank with --crank-joint (crank_joint in the para" in line
+    assert line.startswith(f"error: {HEALTHY}: wheel: no joint is named 'wheel'; the joints are crank; set ")
 
 
 @pytest.mark.parametrize(

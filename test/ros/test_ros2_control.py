@@ -21,6 +21,7 @@ from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.monitor.config.parameters import load_config
 from leg_wear_monitor.recordings.cdr import Decoder
 from leg_wear_monitor.recordings.message_checks import MessageChecks
+from leg_wear_monitor.recordings.streams import INTERFACES
 from leg_wear_monitor.ros import inputs
 from leg_wear_monitor.state import State
 
@@ -156,7 +157,7 @@ def test_an_interface_that_is_not_there_is_reported_with_those_that_are() -> Non
         ),
         ("leg_crank", {"motor_current": 1.0, "motor_temperature": 41.0}, ""),
     ):
-        box.add(inputs.INTERFACES, dynamic_joint_state(1, {joint: there}), 1)
+        box.add(INTERFACES, dynamic_joint_state(1, {joint: there}), 1)
         arrivals = box.take(1)
         checks = MessageChecks(config)
         codes = np.array([one.code for one in arrivals])

@@ -8,33 +8,27 @@ import pytest
 import leg_wear_monitor as lw
 
 EACH = pytest.mark.parametrize(
-    ("verb", "names", "known", "one", "of_it"),
+    ("verb", "names", "one"),
     [
-        ("drives", lw.drives(), "viscous 1.403 N m s/rad",
-         lw.load_drive("pulse115-60"), "torques and speeds at the output shaft"),
-        ("materials", lw.materials(), "p v up to 1.8 N/mm^2 m/s",
-         lw.load_material("steel-on-steel-dry-severe"), "1.98e-12"),
+        ("drives", lw.drives(), lw.load_drive("pulse115-60")),
+        ("materials", lw.materials(), lw.load_material("steel-on-steel-dry-severe")),
     ],
     ids=["drives", "materials"],
 )  # fmt: skip
 
 
 @EACH
-def test_the_list_has_every_name(run, verb, names, known, one, of_it):
+def test_the_list_has_every_name(run, verb, names, one):
     result = run(verb)
     assert result.code == 0
-    assert [line for line in result.out.splitlines() if not line.startswith(" ")] == list(names)
-    assert known in result.out
+    assert [line.partition(":")[0] for line in result.out.splitlines()] == list(names)
+    assert f"{one.name}: {one.title}" in result.out.splitlines()
     assert [each["name"] for each in json.loads(run(verb, "--json", "-").out)[verb]] == list(names)
 
 
 @EACH
-def test_one_in_full_has_every_source(run, verb, names, known, one, of_it):
-    text = run(verb, one.name).out
-    assert of_it in text
-    for key, value in one.values():
-        assert f"{key}: {value.central:g}" in text
-        assert value.source in text
+def test_one_is_its_file(run, verb, names, one):
+    assert run(verb, one.name).out == names[one.name].read_text(encoding="utf-8")
 
 
 def test_json_has_the_numbers_of_the_files(run):

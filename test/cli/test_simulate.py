@@ -114,7 +114,6 @@ def test_a_file_is_replaced_whole_or_stays(run, tmp_path, monkeypatch):
         ("--wear", "on"),
         ("--normal-law", "hunt-crossley"),
         ("--model", "full"),
-        ("--intervals", "1024"),
     ],
 )
 def test_the_ideal_leg_takes_no_option_of_clearance_joints(refused, option, value):

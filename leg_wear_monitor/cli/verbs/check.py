@@ -3,11 +3,10 @@
 import platform
 import shutil
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
-from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,11 +15,7 @@ from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError, ex
 from leg_wear_monitor.files import json_text, package_version, share_directory
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.mechanism.materials import Drive, Material, SourcedValue
     from leg_wear_monitor.monitor.config.settings import DriveParameters
-
-
-_Sourced = TypeVar("_Sourced", "Drive", "Material")
 
 
 # ``leg-wear-monitor check``: faults of a configuration or an installation.
@@ -217,98 +212,47 @@ def _mechanism(name: str) -> str:
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])
 
 
-# ``leg-wear-monitor drives``: drives by name, with the sources of their values.
+# ``leg-wear-monitor drives``, ``leg-wear-monitor materials``: files of the package with sourced values.
 
 
 @click.command(short_help="List the known drives, or show one with its sources.")
 @click.argument("name", required=False)
 @common.json_option("the drives")
 def drives(name: str | None, json_file: Path | None) -> None:
-    """List the drives that the parameter drive.type can name, or print one of them with all its sources.
+    """List the drives that the parameter drive.type can name, or print the file of one of them.
 
     NAME is a drive of the list, or a file such as ./my_drive.yaml.
     """
     from leg_wear_monitor.mechanism import materials as loader
 
-    known = [loader.load_drive(each) for each in ([name] if name is not None else loader.drives())]
-    _report("drives", known, _drive_listed if name is None else _drive_in_full, json_file)
-
-
-def _report(
-    kind: str, known: Sequence[_Sourced], lines: Callable[[_Sourced], list[str]], json_file: Path | None
-) -> None:
-    """Print and write the values of files of the package."""
-    common.check_outputs(json_file, None)
-    document = {"schema_version": 1, kind: [one.to_dict() for one in known]}
-    written = common.write_json(json_file, json_text(document))
-    common.say(json_file, chain.from_iterable(map(lines, known)), written)
-
-
-def _in_lines(values: "Iterable[tuple[str, SourcedValue]]") -> list[str]:
-    """Two lines for each number: its meaning and its source."""
-    lines = []
-    for key, value in values:
-        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
-    return lines
-
-
-def _drive_listed(drive: "Drive") -> list[str]:
-    """A drive in two lines: its kind, and its known values."""
-    known = ", ".join(f"{key.replace('_', ' ')} {value.text}" for key, value in drive.values())
-    return [drive.name, f"    {drive.title}: {known}"]
-
-
-def _drive_in_full(drive: "Drive") -> list[str]:
-    """A drive with every number, its conditions and its source."""
-    head = [f"{drive.name}: {drive.title}", f"torques and speeds at the {drive.shaft} shaft"]
-    return [*head, *_in_lines(drive.values()), *([f"note: {drive.notes}"] if drive.notes else [])]
-
-
-# ``leg-wear-monitor materials``: material pairs of joints, with their sources.
+    _show("drives", loader.drives(), loader.load_drive, name, json_file)
 
 
 @click.command(short_help="List the known material pairs, or show one with its sources.")
 @click.argument("name", required=False)
 @common.json_option("the pairs")
 def materials(name: str | None, json_file: Path | None) -> None:
-    """List the material pairs that a joint can name, or print one of them with all its sources.
+    """List the material pairs that a joint can name, or print the file of one of them.
 
     NAME is a pair of the list, or a file such as ./my_pair.yaml.
     """
     from leg_wear_monitor.mechanism import materials as loader
 
-    names = [name] if name is not None else loader.materials()
-    pairs = [loader.load_material(each) for each in names]
-    _report("materials", pairs, _listed if name is None else _in_full, json_file)
+    _show("materials", loader.materials(), loader.load_material, name, json_file)
 
 
-def _listed(pair: "Material") -> list[str]:
-    """A pair in two lines: its materials, and its known values."""
-    known = pair.wear_coefficients
-    wear = "no wear coefficient" if known is None else " and ".join(f"{k:.3g}" for k in known) + " 1/Pa"
-    limits = (pair.limits.dynamic_pressure or pair.limits.static_pressure, pair.limits.pressure_speed)
-    parts = [
-        f"{label} up to {value.text}" for label, value in zip(("p", "p v"), limits, strict=True) if value
-    ]
-    return [pair.name, f"    {pair.title}: {', '.join([wear, *parts])}"]
-
-
-def _in_full(pair: "Material") -> list[str]:
-    """A pair with every number, its conditions and its source."""
-    lines = [
-        f"{pair.name}: {pair.title}",
-        f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
-        f"regime: {pair.regime}",
-        *_in_lines(pair.values()),
-    ]
-    if pair.wear_coefficients is None:
-        lines.append(
-            "wear coefficient of the pair: not known; a life needs a wear_coefficient next to the material"
-        )
-    else:
-        bushing, journal = pair.wear_coefficients
-        lines.append(f"wear coefficient of the pair: {bushing:.3g} (bushing), {journal:.3g} (journal) 1/Pa")
-    return [*lines, *([f"note: {pair.notes}"] if pair.notes else [])]
+def _show(
+    kind: str, files: Mapping[str, Path], load: Callable[[str], Any], name: str | None, json_file: Path | None
+) -> None:
+    """Print a title per file, or the text of one file; write the values."""
+    common.check_outputs(json_file, None)
+    known = [load(each) for each in ([name] if name is not None else files)]
+    document = {"schema_version": 1, kind: [one.to_dict() for one in known]}
+    written = common.write_json(json_file, json_text(document))
+    lines = [f"{one.name}: {one.title}" for one in known]
+    if name is not None:
+        lines = Path(files.get(name, name)).read_text(encoding="utf-8").splitlines()
+    common.say(json_file, lines, written)
 
 
 # ``leg-wear-monitor cache``: compiled code on this machine.

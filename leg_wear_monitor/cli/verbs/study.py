@@ -177,20 +177,12 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
     type=click.Choice(NORMAL_LAWS),
 )
-@common.positive("--restitution", "E", "Coefficient of restitution of all clearance joints.")
 @common.option(
     "--friction",
     "NAME",
     f"Friction law of all clearance joints: {', '.join(FRICTION_LAWS)}.",
     type=click.Choice(FRICTION_LAWS),
 )
-@common.option(
-    "--friction-coefficient",
-    "MU",
-    "Friction coefficient of all clearance joints.",
-    type=common.Number(min=0.0),
-)
-@common.option("--toe", "BODY.POINT", "Point whose motion is reported.  [default: the point called toe]")
 @click.option(
     "--trace",
     type=click.IntRange(min=0),
@@ -198,9 +190,6 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     default=0,
     help="Keep N samples per cycle for --json and the pictures of --out. Several hundred samples take longer "
     "than the simulation.",
-)
-@common.option(
-    "--intervals", "N", "Model clearance: time intervals per gait cycle.  [default: 2048]", type=int
 )
 @common.json_option("the result")
 @common.out_option("Write result.json and pictures of the leg and its worn bushings.")

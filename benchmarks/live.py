@@ -62,7 +62,6 @@ TYPES = {
     "clearance_states": JointState,
     "predicted_torque": WrenchStamped,
     "impact_forces": JointState,
-    "linkage_states": JointState,
     "markers": MarkerArray,
     "motion": String,
     "state": String,

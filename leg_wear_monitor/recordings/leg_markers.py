@@ -8,7 +8,6 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import TURN, build_linkage, ideal_motion, point_motion
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.mechanism.urdf import joint_positions
 from leg_wear_monitor.monitor import alarm_specs
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, Reports, VerdictReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -18,8 +17,6 @@ from leg_wear_monitor.recordings.streams import Outgoing, Output, single
 from leg_wear_monitor.state import Level
 
 MARKERS = Output("~/markers", encode.MARKER_ARRAY)
-LINKAGE = Output("~/linkage_states", encode.JOINT_STATE)
-"""Joint positions of its robot description (`leg-wear-monitor draw --urdf`), for the ideal leg."""
 
 _PERIOD_NS = 100_000_000
 _STEPS = 180  # positions per turn; the nearest position is drawn
@@ -52,10 +49,6 @@ class LegDrawing:
         Names of joints at the same place, such as ``A B``, by the index of the first joint.
     title : (3,) array
         Position of the title next to the leg.
-    links : tuple of str
-        Joints that carry the links of the mechanism's robot description.
-    link_positions : (STEPS, n) array
-        Positions of these joints [rad; m for a slider].
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -76,8 +69,6 @@ class LegDrawing:
         names = mechanism.clearance_joints
         joints = [path(mechanism.sides(name)[0], name) for name in names]
         self.joints = np.stack(joints, axis=1) if joints else np.zeros((_STEPS, 0, 3))
-        carried = joint_positions(linkage, motion.q)
-        self.links, self.link_positions = tuple(carried), np.stack([*carried.values()], axis=1)
         points = np.concatenate([self.lines, self.joints], axis=1)
         corners = np.array([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
         self.size = float(np.ptp(corners, axis=0).max())
@@ -94,7 +85,7 @@ class LegDrawing:
 
 
 class LegMarkers:
-    """Messages of `MARKERS` and `LINKAGE` while the leg is tracked, the same live and in replay.
+    """Messages of `MARKERS` while the leg is tracked, the same live and in replay.
 
     Parameters
     ----------
@@ -121,16 +112,10 @@ class LegMarkers:
             stamp_ns = int(samples.stamp_ns[i])
             self._take(stamp_ns, int(samples.stamp_ns[-1]))
             if math.isfinite(angle := float(samples.crank_angle_rad[i])):
-                yield from self._at(stamp_ns, self._drawing.step_at(angle))
+                markers = list(self._markers(self._drawing.step_at(angle)))
+                yield single(MARKERS, stamp_ns, encode.marker_array(stamp_ns, markers, self._frame_id))
         if len(samples):
             self._last_ns = int(samples.stamp_ns[-1])
-
-    def _at(self, stamp_ns: int, step: int) -> Iterator[Outgoing]:
-        raw = encode.marker_array(stamp_ns, list(self._markers(step)), self._frame_id)
-        yield single(MARKERS, stamp_ns, raw)
-        position = self._drawing.link_positions[step]
-        rows = encode.joint_states(stamp_ns, self._drawing.links, position=position, frame_id=self._frame_id)
-        yield single(LINKAGE, stamp_ns, rows[0].tobytes())
 
     def _take(self, stamp_ns: int, newest_ns: int) -> None:
         """Show the changes before a stamp; those after the newest sample are of a clock that was set back."""

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.verdict import with_unit
 from leg_wear_monitor.recordings import encode
-from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS
+from leg_wear_monitor.recordings.leg_markers import MARKERS
 from leg_wear_monitor.recordings.streams import LATCHED, SENSOR_DATA, ForecastTimes, Outgoing, Output, single
 from leg_wear_monitor.state import Level
 from leg_wear_monitor.twin import CRANK
@@ -38,7 +38,7 @@ ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
 VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 STATE = Output("~/state", encode.STRING, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
-OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS, LINKAGE)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, STATE, DIAGNOSTICS, MARKERS)
 """Outputs of every monitor."""
 
 _DIGITS = 15

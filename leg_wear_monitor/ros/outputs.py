@@ -24,7 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.recordings.leg_markers import LINKAGE, MARKERS, LegDrawing, LegMarkers
+from leg_wear_monitor.recordings.leg_markers import MARKERS, LegDrawing, LegMarkers
 from leg_wear_monitor.recordings.streams import Outgoing, Output, Qos
 from leg_wear_monitor.ros.running import until_down
 
@@ -194,11 +194,11 @@ class Outlets:
                 handle.publish_raw(whole[at : at + size])
 
 
-# Topics ``~/markers`` and ``~/linkage_states`` of the node; `recordings.leg_markers` makes them.
+# Topic ``~/markers`` of the node; `recordings.leg_markers` makes its messages.
 
 
 class MarkerTopic:
-    """``~/markers`` and ``~/linkage_states``, published while wanted and either subscribed to or recorded.
+    """``~/markers``, published while wanted and either subscribed to or recorded.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ class MarkerTopic:
 
     @property
     def _is_wanted(self) -> bool:
-        return self._monitor.config.publish_markers and any(map(self._outlets.wanted, (MARKERS, LINKAGE)))
+        return self._monitor.config.publish_markers and self._outlets.wanted(MARKERS)
 
     @cached_property
     def _drawing(self) -> LegDrawing:

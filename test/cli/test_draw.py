@@ -1,7 +1,6 @@
 """`draw`: what it writes and says of mechanisms that work and of those that do not."""
 
 import re
-from xml.etree import ElementTree
 
 import pytest
 
@@ -62,7 +61,7 @@ def test_names_are_text(run, evil, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (["four_bar", "--out", "a.png"], "--out: a.png: expected a file that ends in .html or .urdf"),
+        (["four_bar", "--out", "a.png"], "--out: a.png: expected a file that ends in .html"),
         (["four_bar", "--out", "none/a.html"], "--out: none/a.html: cannot be written: No such file"),
         (["nope.yaml"], "nope.yaml: cannot be read: No such file or directory"),
     ],
@@ -73,10 +72,3 @@ def test_bad_input_is_one_line_and_no_file(run, tmp_path, arguments, fault):
     (line,) = result.lines
     assert line.startswith(f"error: {fault}")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_robot_description_in_place_of_a_picture(run, tmp_path):
-    line = ("draw", "slider_crank", "--out", "slider_crank.urdf")
-    assert run(*line).code == 0
-    text = (tmp_path / "slider_crank.urdf").read_text()
-    assert ElementTree.fromstring(text).get("name") == "slider_crank"

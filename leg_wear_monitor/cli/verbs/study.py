@@ -97,16 +97,12 @@ def write_study_page(path: Path) -> int:
 # ``leg-wear-monitor draw``: a picture of a mechanism, working or not.
 
 
-_URDF = ".urdf"
-
-
 @click.command(short_help="Draw a mechanism, even if it is faulty.")
 @click.argument("mechanism", metavar="MECHANISM")
 @common.path_option(
     "--out",
     "FILE",
-    "A page .html, or .urdf for RViz: a tree of the links with the loops cut.  "
-    "[default: MECHANISM.html in this directory]",
+    "A page .html.  [default: MECHANISM.html in this directory]",
 )
 def draw(mechanism: str, out: Path | None) -> int:
     """Draw a mechanism file, or a mechanism that comes with the package.
@@ -116,26 +112,20 @@ def draw(mechanism: str, out: Path | None) -> int:
     page shows its range and the bodies in line at its ends. The exit code is then 1.
     """
     target = Path(f"{Path(mechanism).stem}.html") if out is None else out
-    if target.suffix.lower() not in (".html", _URDF):
-        raise ConfigError("--out", str(target), "expected a file that ends in .html or .urdf")
+    if target.suffix.lower() != ".html":
+        raise ConfigError("--out", str(target), "expected a file that ends in .html")
     common.check_file("--out", target)
     from leg_wear_monitor.mechanism.loader import load_mechanism
 
     leg = load_mechanism(mechanism)
-    found: tuple[str, ...] = ()
     with common.compilation():
-        if target.suffix.lower() == _URDF:
-            from leg_wear_monitor.mechanism.urdf import urdf
+        from leg_wear_monitor.mechanism.reach import findings, headline, reach_of
+        from leg_wear_monitor.report.drawing import drawing_html
 
-            text, words = urdf(leg), leg.name
-        else:
-            from leg_wear_monitor.mechanism.reach import findings, headline, reach_of
-            from leg_wear_monitor.report.drawing import drawing_html
-
-            reach = reach_of(leg)
-            text, words, found = drawing_html(reach), f"{leg.name}: {headline(reach)}", findings(reach)
+        reach = reach_of(leg)
+        text, found = drawing_html(reach), findings(reach)
     common.write_file(target, text.encode())
-    click.echo(f"written: {target}: {printable(words)}")
+    click.echo(f"written: {target}: {printable(f'{leg.name}: {headline(reach)}')}")
     for finding in found:
         click.echo(f"warning: {leg.source}: {printable(finding)}", err=True)
     return common.WITH_FINDINGS if found else 0

@@ -65,22 +65,6 @@ def print_result(result: "SimulationResult", wall_s: float) -> None:
     rows.append(
         ("drive torque", ", ".join(f"{name} {figure(each)}" for name, each in values.items()) + " N m")
     )
-    if result.clearance_joints and result.toe is not None:
-        toe = result.toe
-        rows.append((
-            "largest errors",
-            f"{figure(1e3 * toe.max_position_error_m)} mm, {figure(toe.max_velocity_error_mps)} m/s, "
-            f"{figure(toe.max_acceleration_error_mps2)} m/s^2 at the toe, "
-            f"{figure(torque.max_error)} N m at the drive",
-        ))  # fmt: skip
-    if result.energy_j is not None:
-        energy = result.energy_j
-        rows.append((
-            "energy",
-            f"work in {figure(energy.work_in)} = stored {figure(energy.stored)} + friction "
-            f"{figure(energy.friction_loss)} + impacts {figure(energy.contact_loss)} J, "
-            f"residual {figure(energy.residual)} J",
-        ))  # fmt: skip
     for name, joint in result.joints.items():
         if joint.has_clearance:
             beyond = filter(None, (joint.outside_limits, joint.outside_contact_law))

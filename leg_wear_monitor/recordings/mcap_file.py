@@ -6,11 +6,11 @@ object of each message, and takes ten times as long.
 
 import struct
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import attrs
 import numpy as np
@@ -280,33 +280,6 @@ def _heads(data: NDArray[np.uint8], begins: _Places) -> NDArray[np.void]:
 PROFILE, LIBRARY = "ros2", "leg_wear_monitor"
 
 
-class _Whole:
-    """A file that takes each write whole or not at all: earlier chunks stay readable on a full disk."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with system_asked(path, "cannot be written", error_of=RecordingError):
-            self.file = path.open("wb", buffering=0)
-        self.has_failed = False
-
-    def tell(self) -> int:
-        return self.file.tell()
-
-    def flush(self) -> None:
-        """Nothing is buffered."""
-
-    def write(self, data: bytes) -> None:
-        begin, left = self.file.tell(), memoryview(data)
-        try:
-            while left:
-                left = left[self.file.write(left) :]
-        except OSError as error:
-            self.has_failed = True
-            with suppress(OSError):  # a device cannot be truncated
-                self.file.truncate(begin)
-            raise RecordingError(str(self._path), "", f"cannot be written: {error.strerror}") from error
-
-
 class McapWriter:
     """An MCAP file. Flushed messages stay readable if the process dies.
 
@@ -320,20 +293,28 @@ class McapWriter:
     Raises
     ------
     RecordingError
-        If writing to the disk fails, here and in every method that writes. Earlier chunks stay readable;
-        the file then ends without an index.
+        If writing to the disk fails, here and in every method that writes. The file is then closed without an
+        index; its earlier chunks stay readable.
     """
 
     def __init__(self, path: str | Path, *, chunk_bytes: int = 2**17) -> None:
         self.path = Path(path)
-        self._disk = _Whole(self.path)
-        output: Any = self._disk
-        self._writer = Writer(output, chunk_size=chunk_bytes)
-        self._schemas: dict[str, int] = {}
-        try:
+        with self._asked():
+            self._file = self.path.open("wb")
+            self._writer = Writer(self._file, chunk_size=chunk_bytes)
             self._writer.start(PROFILE, LIBRARY)
+            self._file.flush()
+        self._schemas: dict[str, int] = {}
+
+    @contextmanager
+    def _asked(self) -> Iterator[None]:
+        """Name the file in an error of the disk, after which nothing more is written."""
+        try:
+            with system_asked(self.path, "cannot be written", error_of=RecordingError):
+                yield
         except RecordingError:
-            self._disk.file.close()
+            with suppress(AttributeError, OSError):  # it was not opened, or has bytes that do not fit
+                self._file.close()
             raise
 
     def __enter__(self) -> "McapWriter":
@@ -372,7 +353,8 @@ class McapWriter:
         raw : bytes
             CDR with its encapsulation header.
         """
-        self._writer.add_message(channel, log_time_ns, raw, log_time_ns)
+        with self._asked():
+            self._writer.add_message(channel, log_time_ns, raw, log_time_ns)
 
     def write_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
         """Add messages of equal length.
@@ -386,19 +368,18 @@ class McapWriter:
             One message per row.
         """
         data, size = messages.tobytes(), messages.shape[1]
-        for k, time_ns in enumerate(np.asarray(log_time_ns).tolist()):
-            self._writer.add_message(channel, time_ns, data[k * size : (k + 1) * size], time_ns)
+        with self._asked():
+            for k, time_ns in enumerate(np.asarray(log_time_ns).tolist()):
+                self._writer.add_message(channel, time_ns, data[k * size : (k + 1) * size], time_ns)
 
     def flush(self) -> None:
         """Write the current chunk, so that all messages added so far can be read."""
-        self._writer.flush()
+        with self._asked():
+            self._writer.flush()
 
     def close(self) -> None:
         """Write the remaining messages and the index; no effect if the file is already closed."""
-        if self._disk.file.closed:
-            return
-        try:
-            if not self._disk.has_failed:
+        if not self._file.closed:
+            with self._asked():
                 self._writer.finish()
-        finally:
-            self._disk.file.close()
+                self._file.close()

@@ -12,6 +12,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -28,7 +29,7 @@ from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from, 
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.result import ReplayStatus
 from leg_wear_monitor.recordings.streams import LATCHED, Output, Qos, topic_of
-from leg_wear_monitor.ros.running import WAKE_S, executor_for, spin, stamp_ns_of
+from leg_wear_monitor.ros.running import WAKE_S, spin, stamp_ns_of
 
 # Listens to a running monitor for the dashboard: its outputs, and its parameters once.
 
@@ -82,7 +83,7 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
         wanted = threading.Event()
         wanted.set()
         # With the default executor, a failure in a callback is an exception. Messages are few.
-        spinning = listener, wanted.is_set, lambda node: SingleThreadedExecutor(context=node.context)
+        spinning = listener, wanted.is_set, SingleThreadedExecutor
         thread = threading.Thread(target=spin, args=spinning, name="listener", daemon=True)
         thread.start()
         try:
@@ -198,7 +199,7 @@ class DemoListener:
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node = Node("witness", context=self._context, namespace=namespace)
-        self._executor = executor_for(self._node)
+        self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._node.create_subscription(
             String, topic_of(outputs.STATE, "leg_wear_monitor"), self._take_state, _profile(outputs.STATE.qos)

@@ -6,13 +6,14 @@ from functools import partial
 from typing import Any
 
 import rclpy
-from rcl_interfaces.msg import Parameter, ParameterType, SetParametersResult
+from rcl_interfaces.msg import Parameter, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.context import Context
 from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as ParameterMessage
+from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
@@ -28,17 +29,11 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 SERVICE = "~/measure"
 WHO = f"service {SERVICE}"
 
-_TYPES = {
-    ParameterType.PARAMETER_STRING: ("string", "string_value"),
-    ParameterType.PARAMETER_DOUBLE: ("double", "double_value"),
-    ParameterType.PARAMETER_BOOL: ("bool", "bool_value"),
-    ParameterType.PARAMETER_INTEGER: ("integer", "integer_value"),
-}
-_WANTED = {
-    "joint": ("string", "the name of a clearance joint"),
-    "clearance_m": ("double", "a mean radial clearance in m, such as 0.00042"),
-    "sigma_m": ("double", "its standard deviation in m, such as 0.000005"),
-    "accept": ("bool", "true or false"),
+_WANTED: dict[str, tuple[type, str]] = {
+    "joint": (str, "a string: the name of a clearance joint"),
+    "clearance_m": (float, "a double: a mean radial clearance in m, such as 0.00042"),
+    "sigma_m": (float, "a double: its standard deviation in m, such as 0.000005"),
+    "accept": (bool, "a bool: true or false"),
 }
 _OPTIONAL = ("accept",)
 
@@ -59,19 +54,14 @@ def request_of(parameters: Sequence[Parameter]) -> dict[str, Any]:
             raise ConfigError(printable(one.name, 100), "", fault)
         if one.name in values:
             raise ConfigError(one.name, "", "is given twice")
-        values[one.name] = _value(one)
+        values[one.name] = parameter_value_to_python(one.value)
     for name, (kind, meaning) in _WANTED.items():
         if name not in values and name not in _OPTIONAL:
-            raise ConfigError(name, "", f"is missing. Expected a {kind}: {meaning}")
+            raise ConfigError(name, "", f"is missing. Expected {meaning}")
+        if name in values and type(values[name]) is not kind:
+            found = type(values[name]).__name__
+            raise ConfigError(name, "", f"is of type {found}. Expected {meaning}")
     return values
-
-
-def _value(one: Parameter) -> Any:
-    kind, meaning = _WANTED[one.name]
-    found, field = _TYPES.get(one.value.type, ("other", ""))
-    if found != kind:
-        raise ConfigError(one.name, "", f"is of type {found}. Expected a {kind}: {meaning}")
-    return getattr(one.value, field)
 
 
 def measured(monitor: WearMonitor, wanted: dict[str, Any], stamp_ns: int) -> str:

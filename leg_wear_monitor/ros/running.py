@@ -14,7 +14,8 @@ from typing import Any, TypeVar
 import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -71,17 +72,7 @@ def repeated(report: Callable[[float], None], every_s: float = EVERY_S) -> Itera
 # spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout:
 # with a future that is never done, because spin_once() returns after each message.
 # Jazzy has it since rclpy 7.1.4 of April 2025.
-_new_executor: Callable[..., Executor] | None = None
-with suppress(ImportError):
-    from rclpy.experimental.events_executor import EventsExecutor
-
-    _new_executor = EventsExecutor
 WAKE_S = 0.2
-
-_FORMER = (
-    "this rclpy has no events executor (rclpy 7.1.4 and newer have it): the node runs with the default "
-    "executor, which needs six times the processor time"
-)
 
 DONE, COULD_NOT = 0, 2
 
@@ -131,21 +122,13 @@ def release_memory() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def executor_for(node: Node) -> Executor:
-    """Executor without its node; the log says if it is not the events executor."""
-    if _new_executor is not None:
-        return _new_executor(context=node.context)
-    node.get_logger().warning(_FORMER)
-    return SingleThreadedExecutor(context=node.context)
-
-
 def spin(
     node: Node,
     wanted: Callable[[], bool] = lambda: True,
-    make_executor: Callable[[Node], Executor] = executor_for,
+    make_executor: Callable[..., Executor] = EventsExecutor,
 ) -> None:
     """Spin a node until its context shuts down or `wanted` returns false."""
-    executor = make_executor(node)
+    executor = make_executor(context=node.context)
     try:
         with until_down(node.context):
             executor.add_node(node)

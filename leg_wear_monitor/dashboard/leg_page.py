@@ -89,21 +89,6 @@ def leg_setup(config: MonitorConfig, source: str = "parameters") -> LegSetup:
     return LegSetup(settings_of(config, mechanism), leg_shape(mechanism))
 
 
-def unknown_leg() -> LegSetup:
-    """A leg without joints and shape, until its parameters are known."""
-    default = MonitorConfig()
-    monitor = ReplayMonitor(
-        mechanism="",
-        hardware_id="",
-        clearance_joints=(),
-        commanded_rpm=default.cadence.commanded_rpm,
-        wear_acceleration=1.0,
-        bushing_radius_m={},
-        limits=default.limits,
-    )
-    return LegSetup(monitor, ReplayLeg())
-
-
 def summary_of_now(
     setup: LegSetup, state: LegState, history: ReplayHistory, status: Sequence[ReplayStatus], missing: str
 ) -> ReplaySummary:

@@ -19,7 +19,6 @@ from leg_wear_monitor.dashboard.leg_page import (
     leg_content,
     summary_of_now,
     trends_markup,
-    unknown_leg,
 )
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.files import number_of, or_nan, received_json
@@ -109,14 +108,17 @@ class LiveLeg:
         Topics that its messages are to come from.
     clock : callable
         Seconds that only grow.
+    setup : LegSetup
+        The leg by the parameters of its monitor.
     """
 
-    def __init__(self, node: str, waited_for: Sequence[str], clock: Callable[[], float]) -> None:
+    def __init__(
+        self, node: str, waited_for: Sequence[str], clock: Callable[[], float], setup: LegSetup
+    ) -> None:
         self._node, self._clock = node, clock
         self._waited_for = ", ".join(map(printable, waited_for))
         self._lock = threading.Lock()
-        self._setup: LegSetup | None = None
-        self._why_unknown = "The monitor has not sent its parameters yet."
+        self._setup = setup
         self._state, self._fault = NOTHING_KNOWN, ""
         self._statuses: dict[str, ReplayStatus] = {}
         self._leg_silent_s: float | None = None
@@ -124,11 +126,6 @@ class LiveLeg:
         self._arrived_s: float | None = None
         self._is_new = True
         self._trends: tuple[float, str] = (-math.inf, "")
-
-    def take_setup(self, setup: LegSetup | None, why_not: str = "") -> None:
-        """The leg's parameters, or why they are not known."""
-        with self._lock:
-            self._setup, self._why_unknown, self._is_new = setup, printable(why_not), True
 
     def take_diagnostics(self, stamp_ns: int, statuses: Iterable[ReplayStatus]) -> None:
         """A message of ``/diagnostics``; statuses of other nodes are left out."""
@@ -145,6 +142,8 @@ class LiveLeg:
         """A message of ``~/state``; the page reports a message that it cannot read."""
         try:
             state, fault = received_state(text, f"{self._node}/state"), ""
+            if state.clearances and set(state.clearances) != set(self._setup.monitor.clearance_joints):
+                fault = "This is a different leg. Give the parameter file of its monitor with --config FILE."
         except ConfigError as error:
             state, fault = NOTHING_KNOWN, f"The state of the leg cannot be read: {error}"
         with self._lock:
@@ -165,9 +164,9 @@ class LiveLeg:
     def content(self) -> Content:
         """The page with the last received values."""
         with self._lock:
-            now, why_unknown = self._now(), self._fault or ("" if self._setup else self._why_unknown)
+            now, fault = self._now(), self._fault
             self._is_new = False
-        return leg_content(now, printable(self._node), self.freshness(), why_unknown, self._charts(now))
+        return leg_content(now, printable(self._node), self.freshness(), fault, self._charts(now))
 
     def freshness(self) -> Freshness:
         """Start of the time without messages, or, if the monitor sends messages, of the time without data."""
@@ -195,7 +194,7 @@ class LiveLeg:
         return markup
 
     def _now(self) -> ReplaySummary:
-        setup, gait = self._setup or unknown_leg(), self._statuses.get("gait")
+        setup, gait = self._setup, self._statuses.get("gait")
         missing = "" if self._state.life_cycles else gait.message if gait else "no message was received"
         history = _history(self._past, setup.monitor.clearance_joints)
         return summary_of_now(setup, self._state, history, list(self._statuses.values()), missing)

@@ -7,34 +7,26 @@ from contextlib import contextmanager
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import ParameterValue
-from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.task import Future
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String
 
-from leg_wear_monitor.dashboard.leg_page import LegSetup, leg_setup
 from leg_wear_monitor.dashboard.live_leg import MOST, LiveLeg, received_status
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable
-from leg_wear_monitor.mechanism.loader import is_file_name, shipped_mechanisms
-from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from, is_of_node
+from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.recordings import outputs
 from leg_wear_monitor.recordings.result import ReplayStatus
 from leg_wear_monitor.recordings.streams import LATCHED, Output, Qos, topic_of
 from leg_wear_monitor.ros.running import WAKE_S, spin, stamp_ns_of
 
-# Listens to a running monitor for the dashboard: its outputs, and its parameters once.
+# Listens to the outputs of a running monitor, for the dashboard.
 
 
-_ASK_AGAIN_S = 2.0
 _HEARD = (outputs.STATE, outputs.DIAGNOSTICS)
 
 
@@ -61,7 +53,7 @@ def topics_of(node: str) -> list[str]:
 
 
 @contextmanager
-def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterator[None]:
+def listening(node: str, leg: LiveLeg) -> Iterator[None]:
     """Pass the messages of a monitor to a leg, in a thread, until the end of the context.
 
     Parameters
@@ -69,17 +61,11 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
     node : str
         Name returned by `full_name`.
     leg : LiveLeg
-    setup : LegSetup, optional
-        The leg's parameters; without them, the monitor is asked.
     """
     context = Context()
     context.init(args=[])
     try:
         listener = _Listener(context, node, leg)
-        if setup is None:
-            listener.ask()
-        else:
-            leg.take_setup(setup)
         wanted = threading.Event()
         wanted.set()
         # With the default executor, a failure in a callback is an exception. Messages are few.
@@ -113,53 +99,6 @@ class _Listener(Node):
 
     def _subscribe(self, output: Output, kind: type, take: Callable[[Any], None]) -> Any:
         return self.create_subscription(kind, topic_of(output, self._monitor), take, _profile(output.qos))
-
-    def ask(self) -> None:
-        """Ask for the parameters until there is an answer."""
-        self._client = self.create_client(GetParameters, f"{self._monitor}/get_parameters")
-        self._asked: Future | None = None
-        self._timer = self.create_timer(_ASK_AGAIN_S, self._ask_now)
-        self._names = [name for name in PARAMETERS if is_of_node(name)]
-        self._ask_now()
-
-    def _ask_now(self) -> None:
-        if self._client.service_is_ready() and (self._asked is None or self._asked.done()):
-            self._asked = self._client.call_async(GetParameters.Request(names=self._names))
-            self._asked.add_done_callback(self._answered)
-
-    def _answered(self, future: Future) -> None:
-        values = future.result().values if future.result() else []
-        if len(values) != len(self._names):  # a different node or version
-            self._leg.take_setup(
-                None,
-                "The parameters of the monitor cannot be read; give its parameter file with --config FILE.",
-            )
-            return
-        given = {name: _plain(value) for name, value in zip(self._names, values, strict=True)}
-        try:
-            self._leg.take_setup(_setup(given, self._monitor))
-        except LegWearError as error:
-            self._leg.take_setup(None, f"The leg is not known: {error}")
-        self.destroy_timer(self._timer)
-
-
-def _plain(message: ParameterValue) -> Any:
-    """A value as in a parameter file; ROS passes an empty list as unset."""
-    value = parameter_value_to_python(message)
-    if value is None:
-        return []
-    return value if isinstance(value, bool | int | float | str) else list(value)
-
-
-def _setup(given: dict[str, Any], monitor: str) -> LegSetup:
-    """The leg of a monitor's parameters; it must be in the package, because messages may name no file."""
-    config = config_from(given, monitor)
-    if is_file_name(config.mechanism) or config.mechanism not in shipped_mechanisms():
-        raise LegWearError(
-            f"the monitor uses its own mechanism file, {printable(config.mechanism)}; "
-            "give the parameter file of the monitor with --config FILE"
-        )
-    return leg_setup(config, monitor)
 
 
 def _profile(qos: Qos) -> QoSProfile:

@@ -28,8 +28,7 @@ def setup():
 @pytest.fixture
 def leg(setup, clock):
     """A leg that walks for ten seconds."""
-    leg = LiveLeg(NODE, [f"{NODE}/verdict"], clock)
-    leg.take_setup(setup)
+    leg = LiveLeg(NODE, [f"{NODE}/verdict"], clock, setup)
     for second in range(1, 11):
         walk(leg, second)
     return leg

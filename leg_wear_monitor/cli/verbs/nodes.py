@@ -259,7 +259,7 @@ def dashboard(node: str, config: Path | None, host: str, port: int) -> int:
     """Serve a live page with the verdict, the leg and the trends, until Ctrl-C.
 
     The page cannot change anything. It has no password, so it is served to this machine only, unless --host
-    opens it. A leg with its own mechanism file needs --config.
+    opens it. Give the parameter file of the monitor with --config, unless it has the default leg.
     """
     import_module("tornado")
     from leg_wear_monitor.dashboard.server import listen
@@ -278,8 +278,8 @@ def _live(node: str, config: Path | None) -> Iterator["LiveLeg"]:
     from leg_wear_monitor.ros.listeners import full_name, listening, topics_of
 
     name = full_name(node)
-    leg = LiveLeg(name, topics_of(name), time.monotonic)
-    with listening(name, leg, leg_setup(load_config(config, name)) if config else None):
+    leg = LiveLeg(name, topics_of(name), time.monotonic, leg_setup(load_config(config, name)))
+    with listening(name, leg):
         yield leg
 
 

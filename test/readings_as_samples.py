@@ -17,14 +17,10 @@ def samples(block: Iterable[Reading], start_ns: int) -> Samples:
             reading.kind,
             reading.fault,
             *reading[4:7],
-            _four(reading.encoder_rad),
+            (math.nan,) * ENCODERS,
             reading.foot_force_n,
             math.nan,  # a synthetic drive has no temperature
         )
         for reading in block
     ]
     return np.array(rows, dtype=GAIT_SAMPLE)
-
-
-def _four(angles: tuple[float, ...]) -> tuple[float, ...]:
-    return (*angles, *(math.nan,) * (ENCODERS - len(angles)))

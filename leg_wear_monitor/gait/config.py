@@ -11,7 +11,6 @@ from leg_wear_monitor.mechanism.person import FORE_AFT
 
 # Values of parameters: where a torque or a foot load is published, how a torque is sampled, and the shape of
 # the ground's force.
-MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 NO_LOAD, CONTACT = "none", "contact"
 LOAD_SOURCES = (NO_LOAD, WRENCH, FLOAT64, CONTACT)
@@ -24,10 +23,6 @@ def _not_negative(unit: str, doc: str, default: Any = 0.0, at_most: float | None
 
 
 _fraction = partial(_not_negative, "", at_most=1.0)
-
-
-def _at_most_four(names: tuple[str, ...]) -> str | None:
-    return None if len(names) <= MOST_ENCODERS else f"{list(names)} are more than {MOST_ENCODERS}"
 
 
 def _rises_from_zero(times: tuple[float, ...]) -> str | None:
@@ -71,29 +66,6 @@ class EncoderConfig:
     )
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
-
-
-@attrs.frozen(kw_only=True)
-class JointEncodersConfig:
-    """Further encoders in the messages of the crank: each on a revolute joint, with its own errors."""
-
-    names: tuple[str, ...] = described(
-        "names of further encoders in joint_states, at most four; if empty, none",
-        default=(),
-        check=_at_most_four,
-    )
-    joints: tuple[str, ...] = described(
-        "revolute joint of each encoder; the angle is from the bushing's body to the journal's", default=()
-    )
-    noise_rad: float = _not_negative("rad", "noise of the angles, standard deviation", 1.0e-4)
-    offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; if empty, 0", default=())
-
-    def __attrs_post_init__(self) -> None:
-        for key in ("joints", "offsets_rad"):
-            given = len(getattr(self, key))
-            if given != len(self.names) and (given or key == "joints"):
-                fault = f"has {given} values for {len(self.names)} encoders. Expected one each"
-                raise FieldError(key, fault)
 
 
 @attrs.frozen(kw_only=True)
@@ -206,7 +178,6 @@ class GaitConfig:
     wear_acceleration: float = _not_negative("", "factor on all wear coefficients", 1.0)
     pace: PaceConfig = described("speed of the crank", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
-    joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)
     torque_sensor: TorqueSensorConfig = described(
         "the torque sensor of the drive", factory=TorqueSensorConfig
     )

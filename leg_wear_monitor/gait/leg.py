@@ -2,7 +2,6 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from leg_wear_monitor.dynamics.run import (
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import TEMPLATE, GaitConfig, KnockConfig, LoadConfig, PaceConfig
-from leg_wear_monitor.mechanism.arrays import Floats, body_names
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.person import (
     GROUND_LOAD,
@@ -32,7 +31,7 @@ from leg_wear_monitor.mechanism.person import (
     with_toe_force,
 )
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
 # The ground under the synthetic leg: a force on its toe that differs from step to step.
 
@@ -174,13 +173,12 @@ _FRICTION_RAMP_RADPS = 0.05
 class Instant(NamedTuple):
     """State of the crank at one time, and the ideal sensor values.
 
-    ``torque_impulse`` is the time integral of the drive torque since the start [N m s]; ``encoder_rad`` are
-    the error-free angles of further encoders [rad]; ``torque_nm`` is the present drive torque [N m].
+    ``torque_impulse`` is the time integral of the drive torque since the start [N m s]; ``torque_nm`` is the
+    present drive torque [N m].
     """
 
     crank: CrankMotion
     torque_impulse: float
-    encoder_rad: tuple[float, ...] = ()
     torque_nm: float = math.nan
     foot_force_n: tuple[float, float] = (0.0, 0.0)
 
@@ -215,7 +213,6 @@ class SyntheticLeg:
         self._foot_loads = [i for i, name in enumerate(leg.loads) if name == GROUND_LOAD]
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
-        self._sides = _sides(mechanism, config.joint_encoders.joints)
         self._statistics: RunStatistics = new_run_statistics(len(mechanism.joints))
         self._friction_impulse = 0.0
         self._cycles: list[tuple[float, Floats]] = [(0.0, self.clearance_m())]
@@ -241,10 +238,9 @@ class SyntheticLeg:
         for piece in range(pieces, 0, -1):
             self._step(t if piece == 1 else self.time + (t - self.time) / piece)
         impulse = float(self._statistics.drive_integral[TORQUE]) + self._friction_impulse
-        turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
         now = self._pace.at(t)
         torque_nm = self._run.sample().drive_torque + self._friction_torque(now.speed)
-        return Instant(now, impulse, turned, torque_nm, self.foot_force_n(now.angle))
+        return Instant(now, impulse, torque_nm, self.foot_force_n(now.angle))
 
     def foot_force_n(self, crank_angle: float) -> tuple[float, float]:
         """Force of the ground on the foot in the present step at a crank angle [rad], x and y [N]."""
@@ -311,15 +307,6 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     return attrs.evolve(
         setup, contacts=contacts._replace(clearance=clearance, wear_coefficient=wear), speed=speed
     )
-
-
-def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:
-    """Row indices of the bushing body and the journal body of each revolute joint."""
-    names = body_names(mechanism)
-    for name in joints:
-        if not isinstance(mechanism.joints.get(name), RevoluteJoint):
-            raise ConfigError("gait", "joint_encoders.joints", f"{name!r} is not a revolute joint")
-    return [[names.index(body) for body in mechanism.sides(joint)] for joint in joints]
 
 
 def _checked(knock: KnockConfig, setup: Setup) -> KnockConfig | None:

@@ -18,7 +18,6 @@ from leg_wear_monitor.gait.config import (
     EncoderConfig,
     FootLoadSensorConfig,
     GaitConfig,
-    JointEncodersConfig,
     TorqueSensorConfig,
     TransportConfig,
 )
@@ -31,7 +30,7 @@ _SWITCH_N = 20.0  # vertical force above which a contact switch reads 1
 
 # Each sensor and the transport has its own random stream, selected by this number together with the seed. A
 # changed setting of one sensor therefore leaves the noise of the other sensors unchanged.
-_CRANK_NOISE, _TORQUE_NOISE, _TRANSPORT_NOISE, _ENCODER_NOISE, _LOAD_NOISE = 1, 2, 3, 4, 5
+_CRANK_NOISE, _TORQUE_NOISE, _TRANSPORT_NOISE, _LOAD_NOISE = 1, 2, 3, 5
 
 # Faults that a message can have on the wire. The tracker finds OUT_OF_RANGE in the values, and a message of
 # the wrong type never reaches the topic.
@@ -52,7 +51,6 @@ class Reading(NamedTuple):
     crank_angle_rad: float
     crank_velocity_radps: float
     torque_nm: float
-    encoder_rad: tuple[float, ...] = ()
     foot_force_n: tuple[float, float] = (math.nan, math.nan)
 
 
@@ -96,8 +94,8 @@ def _measured(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
         config.torque_sensor,
         config.foot_load_sensor,
     )
-    crank_noise, torque_noise, encoder_noise, load_noise = (
-        Noise([config.seed, stream]) for stream in (_CRANK_NOISE, _TORQUE_NOISE, _ENCODER_NOISE, _LOAD_NOISE)
+    crank_noise, torque_noise, load_noise = (
+        Noise([config.seed, stream]) for stream in (_CRANK_NOISE, _TORQUE_NOISE, _LOAD_NOISE)
     )
     is_torque_with_crank = torque_config.source == EFFORT  # both are in one JointState
     crank_times = _times(config.encoder.rate_hz, jitter_s, crank_noise, CRANK)
@@ -115,19 +113,17 @@ def _measured(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
         if kind == LOAD:
             foot_force_n = _foot_load(load_config, leg, instant.crank.angle, load_noise)
             if not load_config.silent_from_s or t < load_config.silent_from_s:
-                yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, (), foot_force_n)
+                yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, foot_force_n)
             continue
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
-        encoder_rad: tuple[float, ...] = ()
         if kind == CRANK:
             angle, velocity = _encoder(config.encoder, instant.crank, crank_noise)
-            encoder_rad = _joint_encoders(config.joint_encoders, instant.encoder_rad, encoder_noise)
         if kind == TORQUE or is_torque_with_crank:
             mean_nm = (instant.torque_impulse - last_impulse) / (t - last_torque_s)
             last_torque_s, last_impulse = t, instant.torque_impulse
             is_instant = torque_config.sampling == INSTANT
             torque_nm = _torque(torque_config, instant.torque_nm if is_instant else mean_nm, torque_noise)
-        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm, encoder_rad)
+        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm)
 
 
 def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:
@@ -145,15 +141,6 @@ def _encoder(config: EncoderConfig, crank: CrankMotion, noise: Noise) -> tuple[f
         step = TURN / config.counts_per_turn
         angle = round(angle / step) * step
     return angle % TURN if config.wrapped else angle, velocity
-
-
-def _joint_encoders(
-    config: JointEncodersConfig, angles: tuple[float, ...], noise: Noise
-) -> tuple[float, ...]:
-    """Angles of the joint encoders as measured [rad]."""
-    offsets = config.offsets_rad or (0.0,) * len(angles)
-    pairs = zip(angles, offsets, strict=True)
-    return tuple(angle + offset + config.noise_rad * noise.normal() for angle, offset in pairs)
 
 
 def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float:

@@ -116,16 +116,14 @@ def _foot_load(reading: Reading, stamp: Time, config: PublisherConfig) -> Messag
 
 def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> JointState:
     """Joint state with the crank last, so that no receiver can rely on its position in the list."""
-    further = [*config.further_joints, *config.joint_encoders.names]
     still = [0.0] * len(config.further_joints)
-    unmeasured = [*still, *(math.nan,) * len(config.joint_encoders.names)]
     with_effort = not math.isnan(reading.torque_nm)
     return JointState(
         header=Header(stamp=stamp),
-        name=[*further, config.crank_joint],
-        position=[*still, *reading.encoder_rad, reading.crank_angle_rad],
-        velocity=[*unmeasured, reading.crank_velocity_radps],
-        effort=[*unmeasured, reading.torque_nm] if with_effort else [],
+        name=[*config.further_joints, config.crank_joint],
+        position=[*still, reading.crank_angle_rad],
+        velocity=[*still, reading.crank_velocity_radps],
+        effort=[*still, reading.torque_nm] if with_effort else [],
     )
 
 

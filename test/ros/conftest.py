@@ -31,7 +31,6 @@ if find_spec("rclpy"):
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.utilities import try_shutdown
 
-    from leg_wear_monitor.gait.config import JointEncodersConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
     from leg_wear_monitor.recordings.streams import streams_read
@@ -248,6 +247,5 @@ def arrive_at(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
 @pytest.fixture(scope="session")
 def walk() -> Walk:
-    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel; with two encoders."""
-    encoders = JointEncodersConfig(names=("hip", "knee"), joints=("B", "G"), offsets_rad=(0.1, -2.0))
-    return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5, joint_encoders=encoders))
+    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel."""
+    return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5))

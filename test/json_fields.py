@@ -15,7 +15,7 @@ import numpy as np
 KEYS = {
     "topics": "topic", "faulty": "fault", "made_with": "program", "values": "key", "bodies_m": "body",
     "counts": "state", "cycles_not_used": "reason",
-    "standard_error": "field", "lowest": "column", "highest": "column",
+    "standard_error": "field",
 }  # fmt: skip
 UNITS = {
     "m": "m", "mps": "m/s", "mps2": "m/s²", "n": "N", "nm": "N m", "j": "J", "s": "s", "ns": "ns", "h": "h",

@@ -35,8 +35,8 @@ from leg_wear_monitor.twin.sample import (
     Samples,
 )
 
-MESSAGE = np.dtype([(name, "i8") for name in ("begin", "end", "log_time_ns", "publish_time_ns", "type")])
-"""One message among bytes: from where to where, when it was recorded and sent, and its stream's code."""
+MESSAGE = np.dtype([(name, "i8") for name in ("begin", "end", "log_time_ns", "type")])
+"""One message among bytes: from where to where, when it was recorded, and its stream's code."""
 
 _KIND = np.full(1 + max(stream.code for stream in STREAMS), -1)
 _KIND[[stream.code for stream in STREAMS]] = [stream.kind for stream in STREAMS]
@@ -437,7 +437,7 @@ class Decoder:
         (1,) array of GAIT_SAMPLE
         """
         message = np.zeros(1, MESSAGE)
-        message[0] = (0, len(raw), log_time_ns, log_time_ns, kind)
+        message[0] = (0, len(raw), log_time_ns, kind)
         return self.many(np.frombuffer(raw, np.uint8), message)
 
 

@@ -94,7 +94,6 @@ class DatabaseFile:
         """Messages with log time, stream code and content."""
         messages = np.zeros(len(rows), MESSAGE)
         messages["log_time_ns"], messages["type"] = [row[0] for row in rows], [row[1] for row in rows]
-        messages["publish_time_ns"] = messages["log_time_ns"]
         messages["end"] = np.cumsum([len(row[2]) for row in rows])
         messages["begin"][1:] = messages["end"][:-1]
         data = np.frombuffer(b"".join(row[2] for row in rows), np.uint8)

@@ -238,8 +238,7 @@ class McapFile:
         check_size(segment.stored + len(data) + _BYTES_PER_MESSAGE * int(wanted.sum()))
         messages = np.zeros(int(wanted.sum()), MESSAGE)
         messages["begin"], messages["end"] = begins[wanted] + _HEAD.itemsize, ends[wanted]
-        for name in ("log_time_ns", "publish_time_ns"):
-            messages[name] = np.minimum(heads[name][wanted], _LATEST_NS)
+        messages["log_time_ns"] = np.minimum(heads["log_time_ns"][wanted], _LATEST_NS)
         messages["type"] = codes[heads["channel"][wanted]]
         if read < len(data):
             rest = len(data) - read

@@ -188,7 +188,7 @@ def clock_steps(path: Path, times_ns: NDArray[np.int64]) -> tuple[NDArray[np.boo
     return np.asarray(back), findings
 
 
-TIMES = ("header", "log", "publish")
+TIMES = ("header", "log")
 _TOGETHER = 4096  # smallest intended number of samples in a block
 _FAR_NS = 1_000_000_000  # difference between header stamps and log times
 
@@ -365,7 +365,7 @@ class Recording:
             self._apart_ns = int(piece.messages["log_time_ns"][first] - samples["stamp_ns"][first])
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
-            samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]
+            samples["stamp_ns"] = piece.messages["log_time_ns"]
             mark_zero_stamps(samples)
         return samples
 

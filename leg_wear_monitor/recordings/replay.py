@@ -67,7 +67,7 @@ def replay(
     ledger : path, optional
         Ledger to continue; the ledger named in the parameters is not modified.
     time : str
-        Source of the samples' stamps: ``header``, ``log`` or ``publish``.
+        Source of the samples' stamps: ``header`` or ``log``.
     joint_states, drive_torque, foot_load : str, optional
         Topics; by default found by their relative names.
     node : str, optional

@@ -200,7 +200,7 @@ class ReplayRecording:
     topics : dict of str to str
         Topic that was read, by its relative name in the node.
     time : str
-        Source of the stamps: ``header``, ``log`` or ``publish``.
+        Source of the stamps: ``header`` or ``log``.
     is_partial : bool
         True if recorded data are lost or may be wrong.
     findings : tuple of Finding
@@ -332,11 +332,6 @@ class ReplayHistory:
         source; empty in a file of an older version.
     estimated_sigma_m : dict of str to (n,) array
         Its standard deviation; empty in a file of an older version.
-    lowest : dict of str to (n,) array
-        Smallest value in each group, for cadence, torques, mismatch, load and friction, by their names;
-        empty if each group is one gait cycle.
-    highest : dict of str to (n,) array
-        The largest value in each group.
     """
 
     stamp_ns: Ints
@@ -358,8 +353,6 @@ class ReplayHistory:
     impacts: dict[str, Floats]
     estimated_m: dict[str, Floats] = attrs.Factory(dict)
     estimated_sigma_m: dict[str, Floats] = attrs.Factory(dict)
-    lowest: dict[str, Floats] = attrs.Factory(dict)
-    highest: dict[str, Floats] = attrs.Factory(dict)
 
     def columns(self) -> dict[str, Floats | Ints]:
         """Columns of a table over time; a joint's value after a dot: ``modelled_m.A``."""

@@ -53,7 +53,7 @@ CYCLE_COLUMNS = tuple(field.name for field in _FIELDS if field.type == Floats)
 SUMMARY_COLUMNS = {
     field.name.replace("modelled_", "clearance_"): field.name
     for field in _FIELDS
-    if field.type == dict[str, Floats] and field.name not in ("lowest", "highest")
+    if field.type == dict[str, Floats]
 }
 """Columns of a joint in a summary, by their names in a report, whose clearance is the modelled one."""
 
@@ -143,16 +143,7 @@ def _valid(forecast: _Forecast | None, verdict: Verdict) -> _Forecast | None:
 
 
 POINTS = 1000
-"""Points of a thinned history; it keeps peaks of forces, and the range of quantities without peaks."""
-
-_RANGED = (
-    "cadence_rpm",
-    "measured_torque_rms_nm",
-    "predicted_torque_rms_nm",
-    "torque_mismatch",
-    "load_n",
-    "friction_nm",
-)
+"""Points of a thinned history, which keeps peaks of forces and of the mismatch."""
 
 _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
 
@@ -361,25 +352,17 @@ def _changes(result: ReplayResult) -> tuple[AlarmChange, ...]:
 def _history(history: History) -> ReplayHistory:
     """Columns over groups of gait cycles: last value of each; maximum of peaks, sum of impacts."""
     last = _ends(len(history))
-    columns: dict[str, Any] = {name: history.column(name)[last] for name in CYCLE_COLUMNS}
+    columns: dict[str, Any] = {name: _thinned(name, history.column(name), last) for name in CYCLE_COLUMNS}
     for name, shown in SUMMARY_COLUMNS.items():
         thinned = _thinned(name, history.joint_column(name), last)
         columns[shown] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
-    if len(history) > len(last):
-        begins = _begins(last)
-        for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of known values
-            columns[name] = {each: reduced.reduceat(history.column(each), begins) for each in _RANGED}
     return ReplayHistory(stamp_ns=history.stamp_ns[last], **columns)
 
 
-def _begins(last: Ints) -> Ints:
-    """First index of each group."""
-    return np.concatenate([[0], last[:-1] + 1]) if len(last) else last
-
-
 def _thinned(name: str, column: Floats, last: Ints) -> Floats:
-    begins = _begins(last)
-    if name == "peak_force_n" and len(last):
+    """A column over groups of gait cycles that end with these indices."""
+    begins = np.concatenate([[0], last[:-1] + 1]) if len(last) else last
+    if name in ("peak_force_n", "torque_mismatch") and len(last):
         return np.asarray(np.fmax.reduceat(column, begins))
     if name == "impacts" and len(last):
         return np.asarray(np.add.reduceat(np.nan_to_num(column), begins))

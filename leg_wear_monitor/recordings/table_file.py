@@ -557,7 +557,7 @@ class TableFile:
             row = np.flatnonzero(rows.measured[_KEYS[self._streams[number].kind]])
             stamps = rows.stamp_ns if self._streams[number].has_stamp else log_time_ns
             messages = np.zeros(len(row), MESSAGE)
-            messages["log_time_ns"] = messages["publish_time_ns"] = log_time_ns[row]
+            messages["log_time_ns"] = log_time_ns[row]
             messages["type"] = code
             parts.append((row, self._samples(self._streams[number].kind, rows, row, stamps[row]), messages))
         if not parts:

@@ -88,7 +88,7 @@ class Inbox:
         """Decode messages to samples in the same order."""
         messages = np.zeros(len(arrivals), MESSAGE)
         messages["type"] = [arrival.code for arrival in arrivals]
-        messages["log_time_ns"] = messages["publish_time_ns"] = [one.log_time_ns for one in arrivals]
+        messages["log_time_ns"] = [one.log_time_ns for one in arrivals]
         messages["end"] = np.cumsum([len(arrival.raw) for arrival in arrivals])
         messages["begin"][1:] = messages["end"][:-1]
         data = np.frombuffer(b"".join(arrival.raw for arrival in arrivals), np.uint8)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 # Names are repeated here, because --help must not wait for numba; tests compare them with the library.
-TIMES = ("header", "log", "publish")
+TIMES = ("header", "log")
 
 
 @click.command(short_help="Run the monitor on a recording.")

@@ -54,40 +54,29 @@ def health_chart(summary: ReplaySummary) -> Chart:
     rpm = summary.monitor.commanded_rpm
     steady = _STEADY * abs(rpm)
 
-    def known(name: str, unit: str, column: str, colour: str = "--series-0") -> list[Series]:
-        """A series; if it is thinned, with its smallest and largest values."""
-        series = Series(name, unit, getattr(history, column), colour)
-        ends = (("lowest", history.lowest), ("highest", history.highest))
-        return [
-            series,
-            *(
-                attrs.evolve(series, name=f"{name}, {words}", values=values[column], width=0.7)
-                for words, values in ends
-                if column in values
-            ),
-        ]
-
-    cadence, mismatch = known("cadence", "rpm", "cadence_rpm"), known("mismatch", "", "torque_mismatch")
-    mismatches = [each.values for each in mismatch]
-    torque = known("measured", "N m", "measured_torque_rms_nm")
-    torque += known("predicted", "N m", "predicted_torque_rms_nm", "--series-1")
+    cadence = Series("cadence", "rpm", history.cadence_rpm)
+    mismatch = Series("mismatch", "", history.torque_mismatch)
+    torque = [
+        Series("measured", "N m", history.measured_torque_rms_nm),
+        Series("predicted", "N m", history.predicted_torque_rms_nm, "--series-1"),
+    ]
     commanded = attrs.evolve(_limit("commanded", "rpm", rpm, history.cadence_rpm), colour="--ink")
     panels = [
         Panel(
             "Cadence",
-            [*cadence, commanded],
-            low=min(rpm - steady, -_greatest(*(-each.values for each in cadence), otherwise=-rpm)),
-            high=max(rpm + steady, _greatest(*(each.values for each in cadence), otherwise=rpm)),
+            [cadence, commanded],
+            low=min(rpm - steady, -_greatest(-cadence.values, otherwise=-rpm)),
+            high=max(rpm + steady, _greatest(cadence.values, otherwise=rpm)),
         ),
         Panel("Drive torque, RMS of each gait cycle", torque, low=0.0),
         Panel(
             "Unexplained fraction of the torque",
-            [*mismatch, _limit("limit", "", limit, history.torque_mismatch)],
+            [mismatch, _limit("limit", "", limit, history.torque_mismatch)],
             low=0.0,
-            high=max(1.1 * max(limit, _greatest(history.torque_mismatch)), _greatest(*mismatches)),
+            high=1.1 * max(limit, _greatest(history.torque_mismatch)),
         ),
-        Panel("Load at the foot", known("load", "N", "load_n")),
-        Panel("Friction of the drive", known("friction", "N m", "friction_nm")),
+        Panel("Load at the foot", [Series("load", "N", history.load_n)]),
+        Panel("Friction of the drive", [Series("friction", "N m", history.friction_nm)]),
     ]
     caption = (
         "Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "

@@ -152,7 +152,7 @@ def measure_on(
     return str(result.reason)
 
 
-def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
+def trigger_on(monitor: str, name: str, wait_s: float) -> str:
     """Call a service without arguments of a running monitor.
 
     Parameters
@@ -162,26 +162,21 @@ def trigger_on(monitor: str, name: str, wait_s: float, times: int) -> str:
     name : str
         Name of the service below the node, such as ``reset_wear/G``.
     wait_s : float
-        Longest wait for the service, and again for each answer.
-    times : int
-        Most calls; a reset asks to be called twice.
+        Longest wait for the service, and again for its answer.
 
     Returns
     -------
     str
-        The first answer of success.
+        The answer.
 
     Raises
     ------
     LegWearError
-        If no monitor answers, or the monitor refuses the last call.
+        If no monitor answers, or the monitor refuses the call.
     """
     service = _service_of(monitor, name)
     with _caller(Trigger, service, wait_s) as call:
-        for _ in range(times):
-            answer = call(Trigger.Request())
-            if answer.success:  # another client may have done it just before
-                break
+        answer = call(Trigger.Request())
     if not answer.success:
         raise LegWearError(f"{service}: {answer.message}")
     return str(answer.message)

@@ -21,7 +21,6 @@ from leg_wear_monitor.mechanism.loader import doubts, load_mechanism
 from leg_wear_monitor.monitor.alarms import ADVICE
 from leg_wear_monitor.monitor.config.fitting import check_limits, parameter_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 from leg_wear_monitor.monitor.reports import DIAGNOSTICS_PERIOD_S, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor, open_monitor
@@ -48,33 +47,7 @@ def boot_id() -> str:
         return ""
 
 
-# Helpers of the operator services: confirmation, audit time, reply texts.
-
-
-CONFIRM_S = 30.0
-
-
-class Confirmation:
-    """Two-step confirmation of a wear reset: any node in the domain can call a service once by mistake.
-
-    Parameters
-    ----------
-    now_s : callable
-        Returns the time of a monotonic clock [s].
-    """
-
-    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
-        self._now_s = now_s
-        self._asked_s: dict[str, float] = {}
-
-    def is_confirmed(self, what: str) -> bool:
-        """True if the same request came less than `CONFIRM_S` ago; otherwise registers it as the first."""
-        now_s = self._now_s()
-        asked_s = self._asked_s.pop(what, None)
-        if asked_s is not None and now_s - asked_s <= CONFIRM_S:
-            return True
-        self._asked_s[what] = now_s
-        return False
+# The time of the operators' actions.
 
 
 def audit_time(now_ns: int) -> int:
@@ -91,22 +64,6 @@ def audit_time(now_ns: int) -> int:
             "publish /clock or start the node without use_sim_time"
         )
     return now_ns
-
-
-def asked_once(joint: str, wear: JointWear) -> str:
-    """Reply to a first reset request: the wear that a reset would delete, and how to confirm."""
-    return (
-        f"joint {joint}: not reset yet; this would set {wear_words(wear)} to 0; "
-        f"call again within {CONFIRM_S:g} s if the part was replaced"
-    )
-
-
-def undone(joint: str, wear: JointWear) -> str:
-    """Reply to an undone reset: the joint's wear, including the wear since the reset."""
-    return (
-        f"joint {joint}: the reset is undone, the wear is again {wear_words(wear)}, including the wear since "
-        f"the reset"
-    )
 
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
@@ -178,7 +135,6 @@ class MonitorNode(ClosingNode):
         parameters.follow(
             self, self._configure, lambda config: check_limits(config, mechanism, self.get_name())
         )
-        self._confirmation = Confirmation()
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
         self._markers = MarkerTopic(self._outlets, self._monitor)
@@ -371,22 +327,20 @@ class MonitorNode(ClosingNode):
 
     def _reset_wear(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())
-        if not self._confirmation.is_confirmed(joint):
-            raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
+        was = wear_words(self._monitor.wear_of(joint))
         alarms = alarm_words(*self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear"))
         self._send_state_and_forecast()
         fault = not_stored(self._monitor)
         history = "" if fault else f", history kept; ~/undo_reset/{joint} reverts this"
-        reply = (
-            f"joint {joint}: new surfaces{history}; alarms {alarms}; let the leg walk to confirm the repair"
-        )
-        return with_storage(reply, fault)
+        reply = f"joint {joint}: new surfaces, {was} set to 0{history}; alarms {alarms}"
+        return with_storage(f"{reply}; let the leg walk to confirm the repair", fault)
 
     def _undo_reset(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())
-        was = self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset")
+        wear = wear_words(self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset"))
         self._send_state_and_forecast()
-        return with_storage(undone(joint, was), not_stored(self._monitor))
+        reply = f"joint {joint}: the reset is undone, the wear is again {wear}"
+        return with_storage(f"{reply}, including the wear since the reset", not_stored(self._monitor))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -262,7 +262,7 @@ def test_many_at_once_are_as_one_by_one(store, joint_state, parts, gap):
     data, messages = b"", np.zeros(len(raws), MESSAGE)
     for i, raw in enumerate(raws):
         data += b"\xff" * gap
-        messages[i] = (len(data), len(data) + len(raw), 5, 5, JOINT_STATE)
+        messages[i] = (len(data), len(data) + len(raw), 5, JOINT_STATE)
         data += raw
     decoder = Decoder(MonitorConfig())
     together = decoder.many(np.frombuffer(data, np.uint8), messages)

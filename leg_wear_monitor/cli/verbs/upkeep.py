@@ -112,12 +112,12 @@ def _withdraw(monitor: "WearMonitor", joint: str) -> str:
     return f"{name}: {value}, entered {entered} by {found.who}, is withdrawn"
 
 
-def _triggered(node: str, service: str, wait_s: float, times: int = 1) -> int:
-    """Have a running monitor do it; a service that is called twice confirms a reset."""
+def _triggered(node: str, service: str, wait_s: float) -> int:
+    """Have a running monitor do it."""
     common.need_rclpy()
     from leg_wear_monitor.ros.measure import trigger_on
 
-    return _answered(trigger_on(node, service, wait_s, times))
+    return _answered(trigger_on(node, service, wait_s))
 
 
 def _answered(reply: str) -> int:
@@ -166,7 +166,7 @@ def reset(joint: str, undo: bool, **target: Any) -> int:
     """
     if (live := _live_node(**target)) is not None:
         service = f"{'undo_reset' if undo else 'reset_wear'}/{joint}"
-        return _triggered(live, service, target["wait_s"], times=1 if undo else 2)  # a reset is confirmed
+        return _triggered(live, service, target["wait_s"])
     from leg_wear_monitor.monitor.operator_actions import alarm_words, wear_words
 
     now_ns, who = time.time_ns(), getpass.getuser()

@@ -58,9 +58,8 @@ def test_check_prints_what_is_declared_of_the_drive(run, tmp_path: Path, monkeyp
     assert result.code == 0
     line = next(line for line in result.out.splitlines() if "at the crank" in line)
     assert line.strip() == (
-        "drive erob80-50, at the crank: lag 0.004 s, load friction 0.036, "
-        "Coulomb friction 6.52 N m, viscous friction 5.612 N m s/rad, stiffness 800 N m/rad; "
-        "the rest is estimated"
+        "drive erob80-50, at the crank: lag_s 0.004, load_friction 0.036, coulomb_nm 6.52, "
+        "viscous_nms 5.612, stiffness_nm_per_rad 800; the rest is estimated"
     )
 
 

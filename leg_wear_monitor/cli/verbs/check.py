@@ -21,16 +21,6 @@ if TYPE_CHECKING:
 # ``leg-wear-monitor check``: faults of a configuration or an installation.
 
 
-_FIGURES = {
-    "lag_s": "lag {:.4g} s",
-    "bandwidth_hz": "bandwidth {:.4g} Hz",
-    "load_friction": "load friction {:.4g}",
-    "coulomb_nm": "Coulomb friction {:.4g} N m",
-    "viscous_nms": "viscous friction {:.4g} N m s/rad",
-    "stiffness_nm_per_rad": "stiffness {:.4g} N m/rad",
-}
-
-
 @click.command(short_help="Check a configuration or the installation.")
 @click.argument("configs", nargs=-1, metavar="[CONFIG]...")
 def check(configs: tuple[str, ...]) -> int:
@@ -184,7 +174,7 @@ def _drive(parameters: "DriveParameters", path: str) -> str:
     declared = drive_figures(parameters, path).declared
     if not (declared or parameters.type):
         return ""
-    known = [_FIGURES[name].format(value) for name, value in declared.items()]
+    known = [f"{name} {value:.4g}" for name, value in declared.items()]
     drive = f"\n{'':13} drive {parameters.type}".rstrip()
     return f"{drive}, at the crank: {', '.join(known) or 'no value is declared'}; the rest is estimated"
 

@@ -25,8 +25,6 @@ _TABLE_ROWS = 12  # most rows of the printed table, spread over the life
 @common.clearances_option
 @common.speed_option
 @common.limit_option
-@common.positive("--horizon-cycles", "N", "Largest number of gait cycles.", default=1.0e9)
-@common.positive("--wear-factor", "X", "Factor on all wear coefficients.", default=1.0)
 @common.option(
     "--duty",
     "N:H,...",
@@ -65,34 +63,21 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     common.say(json_file, life_lines(result, limit_m, document["validity"]), written)
 
 
-def _life(leg: "Mechanism", duty: str | None, wear_factor: float, **options: Any) -> "Life":
-    """Check the options, and simulate the life."""
-    import numpy as np
+_HORIZON_CYCLES = 1.0e9
 
-    from leg_wear_monitor.contact.arrays import clearance_settings
-    from leg_wear_monitor.life.life import (
-        LifeRun,
-        LifeSettings,
-        check_can_wear,
-        check_life,
-        simulate_life,
-    )
+
+def _life(
+    leg: "Mechanism", duty: str | None, limit_m: float, speed_rpm: float | None, **given: Any
+) -> "Life":
+    """Simulate the life; options that were not given have the defaults of LifeSettings."""
+    from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Duty
 
-    # options that were not given have the defaults of LifeSettings
-    names = "legs", "cycles", "max_wear_per_jump_m"
-    given = {name: value for name in names if (value := options.pop(name)) is not None}
-    settings = LifeSettings(**given)
+    settings = LifeSettings(**{name: value for name, value in given.items() if value is not None})
     loads = None if duty is None else Duty.parse(duty)
-    # bad settings are refused before the kernels are compiled, which takes a while
-    joints = clearance_settings(leg, leg.clearance_joints)
-    check_can_wear(leg, leg.clearance_joints)
-    sizes = np.array([[joint.radial_clearance, joint.bushing_radius] for joint in joints])
-    clearance_m, radius_m = sizes.reshape(-1, 2).T
-    check_life(leg.clearance_joints, clearance_m, radius_m, options["limit_m"], settings.max_wear_per_jump_m)
     with common.compilation(), common.progress_bar("life") as progress:
-        run = LifeRun(leg, settings, speed_rpm=options.pop("speed_rpm"), wear_factor=wear_factor, duty=loads)
-        return simulate_life(run, progress=progress, **options)
+        run = LifeRun(leg, settings, speed_rpm=speed_rpm, duty=loads)
+        return simulate_life(run, limit_m=limit_m, horizon_cycles=_HORIZON_CYCLES, progress=progress)
 
 
 def _document(leg: "Mechanism", result: "Life", limit_m: float) -> dict[str, Any]:

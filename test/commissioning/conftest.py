@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from raw_messages import DYNAMIC_JOINT_STATE, dynamic_joint_state
+from dynamic_messages import DYNAMIC_JOINT_STATE, dynamic_joint_state
 
 from leg_wear_monitor import Mechanism, MonitorConfig
 from leg_wear_monitor.estimate.torque_model import TorqueModel, torque_model

@@ -66,7 +66,7 @@ NOT_MEASURED = {
     "missing": ({"joint": "G", "clearance_m": 9.0e-4}, "sigma_m: is missing. Expected a double"),
     "of a different type": (
         MEASURED | {"clearance_m": 1},
-        "clearance_m: is of type integer. Expected a double",
+        "clearance_m: is of type int. Expected a double",
     ),
     "twice": (MEASURED, "joint: is given twice"),
 }

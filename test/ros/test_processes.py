@@ -120,28 +120,6 @@ def test_a_node_stopped_while_it_imports_ends_in_order(name: str, verb: tuple[st
     assert (done.returncode, done.stdout, done.stderr) == (0, LOADING.format(name=name) + "\n", "")
 
 
-def test_a_node_runs_with_an_rclpy_that_has_no_events_executor() -> None:
-    code = (
-        "import sys\n"
-        "sys.modules['rclpy.experimental.events_executor'] = None\n"
-        "import rclpy\n"
-        "from leg_wear_monitor.ros.running import ClosingNode, run, spin\n"
-        "beats = []\n"
-        "def make():\n"
-        "    node = ClosingNode('leg')\n"
-        "    node.create_timer(0.01, lambda: beats.append(1))\n"
-        "    return node\n"
-        "code = run(make, lambda node, wanted: spin(node, lambda: wanted() and len(beats) < 5), ['leg'])\n"
-        "print(code, len(beats))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    code, beats = map(int, done.stdout.split())
-    assert (done.returncode, code) == (0, 0)
-    assert beats >= 5  # whether to go on is asked every 0.2 s
-    (line,) = done.stderr.splitlines()
-    assert "this rclpy has no events executor (rclpy 7.1.4 and newer have it)" in line
-
-
 def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: Path) -> None:
     """In a callback of LLVM, where Python prints an exception and goes on: the node went on, too."""
     ledger = tmp_path / "wear.db"

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
-from raw_messages import dynamic_joint_state
+from dynamic_messages import dynamic_joint_state
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig

@@ -210,7 +210,6 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     # the next one is judged as the first was
     again = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
     assert again.out.splitlines()[:3] == first.out.splitlines()[:3]
-    assert again.out.splitlines()[3].startswith("2 of 2 measured clearances")
     assert run("measure", "A", "--withdraw", *kept).code == 0
 
 

@@ -33,14 +33,19 @@ from leg_wear_monitor.estimate.clearance_fit import ChangeDetector, best_fit
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.leg_model import (
     FAR_FROM_FILE,
-    ONLY_SCATTER,
     WORTH_IDENTIFYING,
     explainer_of,
     identified_leg,
     leg_of_ideal_torque,
     misfit,
 )
-from leg_wear_monitor.estimate.signature import CommissionedTorque, TorqueSensor, signatures, with_noise_of
+from leg_wear_monitor.estimate.signature import (
+    CommissionedTorque,
+    TorqueSensor,
+    mean_signatures,
+    signatures,
+    with_noise_of,
+)
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.leg import Pace
 from leg_wear_monitor.mechanism.position import TURN, build_linkage
@@ -219,7 +224,9 @@ def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, r
     if is_far and not start.compliance:  # the ideal leg's torque knows no coupling
         start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed, start.load)
     run.begin_identification(*new(leg), reference.profile, start)
-    return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)
+    varied, model = simulated(run), explainer.model
+    expected = mean_signatures(varied, model.sensor)[0]
+    return identified_leg(varied.parameters, expected, varied, model, explainer.nuisances, known)
 
 
 def simulated(run: TorqueReferenceRun) -> TorqueReference:
@@ -435,7 +442,7 @@ def rounds_of(leg, reference, walk, sensor, noise_nm, draws, file, next_leg=bodi
         explainer, known, healthy = explained(leg, reference, walk, sensor, noise_nm, draws(), commissioned)
         off = None if known is None else misfit(explainer.model, explainer.nuisances, known)
         yield Round(reference, explainer, known, healthy, off)
-        if off is None or number > ROUNDS or off < (WORTH_IDENTIFYING if number == 1 else ONLY_SCATTER):
+        if off is None or number > ROUNDS or off < WORTH_IDENTIFYING:
             return
 
         def identify(reference=reference, explainer=explainer, known=known) -> TorqueReference:

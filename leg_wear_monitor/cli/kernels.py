@@ -32,7 +32,7 @@ def _monitor() -> None:
     leg = lw.load_mechanism()
     lw.WearMonitor(leg).warm_up()
     parameters, depth = LegParameters.none(leg), np.zeros((len(leg.clearance_joints), 2, 1))
-    run = TorqueReferenceRun(leg, cycles=1)
+    run = TorqueReferenceRun(leg, cycles=1, far_cycles=1)
     run.begin_expected(np.zeros(len(depth)), depth, CrankProfile.steady(1.0), parameters)
     run.finish()
 

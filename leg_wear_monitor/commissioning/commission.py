@@ -312,6 +312,6 @@ def _with_reference(
             f"Expected at least {_LEAST_CYCLES}"
         )
         return attrs.evolve(result, not_told=(*result.not_told, why))
-    (made,) = simulated_under(walk.mechanism, [mean_profile(walk.profiles)], progress)
+    made = simulated_under(walk.mechanism, mean_profile(walk.profiles), progress)
     values = {**values_of(result.config), "diagnosis.reference": str(file)}
     return attrs.evolve(result, reference=made, config=config_from(values, "commission"))

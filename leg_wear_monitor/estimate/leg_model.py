@@ -283,7 +283,7 @@ def compared_with(own: Explainer, commissioned: CommissionedTorque) -> Explainer
 # this torque by half of its size.
 
 
-# residual from which on a leg is identified, and the residual at which identification ends: scatter alone
+# residual from which on a leg is identified, and the residual at which its steps end: scatter alone
 # leaves 0.1 to 0.25, and 0.5 to 0.6 where samples fall at the same angles in each gait cycle. J at 0.45 mm
 # was 0.48 to 0.50 mm where 0.39 was left, 0.54 at 0.58, and 0.62, or I was taken for it, at 0.68 (2026-11-26)
 WORTH_IDENTIFYING, ONLY_SCATTER = 0.6, 0.45
@@ -305,15 +305,26 @@ _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: th
 _OF_SIZE, _OF_STEP, _ROUGHNESS = 0.005, 0.1, 0.1
 
 
-def misfit(model: SignatureModel, nuisances: Sequence[Nuisance], commissioned: CommissionedTorque) -> float:
-    """Mean square of a model's residual for a commissioned leg, in units of its uncertainty."""
-    rest = commissioned.mean - model.at(commissioned.clearance_m)[0]
+def misfit(
+    model: SignatureModel,
+    nuisances: Sequence[Nuisance],
+    commissioned: CommissionedTorque,
+    expected: Floats | None = None,
+) -> float:
+    """Mean square of a model's residual for a commissioned leg, in units of its uncertainty.
+
+    The expected signature (F,) may be of a different simulated leg than the model's.
+    """
+    expected = model.at(commissioned.clearance_m)[0] if expected is None else expected
+    rest = commissioned.mean - expected
     covariance = _covariance(model, nuisances, commissioned.cycles)
     return float(rest @ np.linalg.solve(covariance, rest)) / len(rest)
 
 
 def identified_leg(
-    legs: TorqueReference,
+    near: LegParameters,
+    expected: Floats,
+    varied: TorqueReference,
     model: SignatureModel,
     nuisances: Sequence[Nuisance],
     commissioned: CommissionedTorque,
@@ -321,18 +332,21 @@ def identified_leg(
     """Most probable parameters of a commissioned leg: one step of Gauss and Newton.
 
     Parameters that the torque does not show keep the file's values. Lengths are assumed to be as far from the
-    file as the simulated leg's lengths.
+    file as the lengths of the leg near it.
 
     Parameters
     ----------
-    legs : TorqueReference
-        Legs of `begin_identification`, with the clearances of the commissioned leg.
+    near : LegParameters
+        A leg near the commissioned one.
+    expected : (F,) array
+        Its simulated signature, with the clearances of the commissioned leg.
+    varied : TorqueReference
+        Legs of `begin_identification`. They need not be exactly near this leg: then further steps are needed.
     model : SignatureModel
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
     """
-    means = mean_signatures(legs, model.sensor)
-    bodies, near = len(legs.parameters.mass), legs.parameters
+    means, bodies = mean_signatures(varied, model.sensor), len(near.mass)
     # friction is positive, and known to a factor: its logarithm is the unknown
     before = np.concatenate([near.mass - 1.0, near.length - 1.0, [math.log(near.friction)]])
     far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
@@ -342,7 +356,7 @@ def identified_leg(
     slopes = means[1:].T @ levels / (len(levels) * steps)
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
-    rest = commissioned.mean - means[0]
+    rest = commissioned.mean - expected
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
     mass, length, log_friction = np.split(found, [bodies, 2 * bodies])
     friction = math.exp(np.clip(log_friction.item(), -_LARGEST_LOG, _LARGEST_LOG))

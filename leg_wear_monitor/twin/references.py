@@ -303,13 +303,15 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     mechanism : Mechanism
     cycles : int, optional
         Gait cycles of each leg; the first leg, which is the expected leg, has twice as many.
+    far_cycles : int, optional
+        Gait cycles of each leg that is far from the expected one.
     """
 
     pace = SIM_CYCLES_PER_PERIOD
 
-    def __init__(self, mechanism: Mechanism, cycles: int = CYCLES) -> None:
+    def __init__(self, mechanism: Mechanism, cycles: int = CYCLES, far_cycles: int = CYCLES // 2) -> None:
         super().__init__(mechanism)
-        self._cycles = cycles
+        self._cycles, self._far_cycles = cycles, far_cycles
         joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._radius = np.array([joint.bushing_radius for joint in joints])
         self._fresh = np.array([joint.radial_clearance for joint in joints])
@@ -389,7 +391,7 @@ class TorqueReferenceRun(ReferenceRun[TorqueReference]):
     ) -> None:
         (own, expected), *others = legs
         near = [are_near or (one is own and (wider <= _FAR * expected).all()) for one, wider in others]
-        cycles = [2 * self._cycles, *(self._cycles if each else -(-self._cycles // 2) for each in near)]
+        cycles = [2 * self._cycles, *(self._cycles if each else self._far_cycles for each in near)]
         self._begin([Leg(*leg, n) for leg, n in zip(legs, cycles, strict=True)], depth, profile, done)
 
     @property

@@ -22,6 +22,7 @@ def test_references_of_two_cadences_are_written_and_named(run, tmp_path: Path, m
     result = run("reference", "bionic_leg", "--cadence", "57", "--cadence", "-60", "--out", "leg.npz")
     assert result.code == 0, result.err
     assert "bionic_leg at 57 rpm: 24 legs, 1 gait cycles each" in result.out
+    assert "bionic_leg at -60 rpm: 33 legs, 1 gait cycles each" in result.out
     assert "written: leg.npz, after " in result.out
     assert result.err == ""  # no progress bar in a pipe
     (tmp_path / "monitor.yaml").write_text("/**: {ros__parameters: {diagnosis: {reference: leg.npz}}}")
@@ -49,7 +50,7 @@ def test_a_reference_under_a_load_is_of_a_leg_that_carries_it(run, tmp_path: Pat
     made = {}
     for name, load in (("air", ()), ("ground", ("--load", "stance.csv"))):
         assert run("reference", "bionic_leg", *load, "--out", f"{name}.npz").code == 0
-        (made[name],) = reference_file.read_references(tmp_path / f"{name}.npz", leg)
+        made[name], *_ = reference_file.read_references(tmp_path / f"{name}.npz", leg)
     assert not made["air"].parameters.load.size
     known = made["ground"].parameters.load
     assert known == pytest.approx(300.0 * nominal_stance(linkage).force(), abs=1.5)

@@ -163,7 +163,8 @@ def _parameters(path: str, node: str | None = None) -> str:
         from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 
         known = read_references(Path(config.diagnosis.reference), leg)
-        text += f", references at {', '.join(f'{one.profile.cadence_rpm:.3g}' for one in known)} rpm"
+        at = {f"{one.profile.cadence_rpm:.3g}": None for one in known}
+        text += f", references at {', '.join(at)} rpm"
     return text + _drive(config.drive, path)
 
 

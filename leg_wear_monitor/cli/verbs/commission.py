@@ -179,9 +179,9 @@ def reference(
     began = time.perf_counter()
     with common.compilation(), common.progress_bar("simulating") as progress:
         made = simulated_references(leg, cadences, progress, force)
-    for cadence, one in zip(cadences, made, strict=True):
-        cycles = len(one.torque_nm[-1])
-        click.echo(f"{leg.name} at {cadence:g} rpm: {len(one.torque_nm)} legs, {cycles} gait cycles each")
+    for one in made:
+        rpm, cycles = one.profile.cadence_rpm, len(one.torque_nm[-1])
+        click.echo(f"{leg.name} at {rpm:g} rpm: {len(one.torque_nm)} legs, {cycles} gait cycles each")
     file = BytesIO()
     write_references(file, leg, made)
     common.write_file(out, file.getvalue())

@@ -16,14 +16,14 @@ from leg_wear_monitor.mechanism.position import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.twin.reference import CrankProfile, LegParameters
-from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.twin.references import TorqueReference, TorqueReferenceRun, levels_of
 from leg_wear_monitor.wear import SECTORS
 
-FORMAT = 3  # 2 had the same number of gait cycles for all legs but the first
+FORMAT = 4  # 3 had no legs that show how masses, lengths and friction act
 
 _LOAD_SIGMA = 0.05  # relative error of a given force: a sensor's mean over some steps
 
-BEFOREHAND_CYCLES = 40  # gait cycles per leg: twice as many as while the leg walks
+BEFOREHAND_CYCLES = 40  # gait cycles per leg: two and four times as many as while the leg walks
 
 # exceptions from a damaged archive, because a damaged byte may be anywhere in it
 _DAMAGES = (
@@ -39,6 +39,8 @@ def simulated_references(
     load: Floats | None = None,
 ) -> tuple[TorqueReference, ...]:
     """References of a new leg whose crank turns steadily, as many cores as there are at once.
+
+    In the air, each is followed by the legs that show how masses, lengths and friction act.
 
     Parameters
     ----------
@@ -56,35 +58,56 @@ def simulated_references(
     LegWearError
         If the leg cannot be simulated.
     """
-    steady = [CrankProfile.steady(cadence / 60.0 * TURN) for cadence in cadences_rpm]
-    return simulated_under(mechanism, steady, progress, load)
+    made: list[TorqueReference] = []
+    number = len(cadences_rpm) * (2 if load is None else 1)
+
+    def part(fraction: float) -> None:
+        progress((len(made) + fraction) / number)
+
+    for cadence in cadences_rpm:
+        profile = CrankProfile.steady(cadence / 60.0 * TURN)
+        made.append(simulated_under(mechanism, profile, part, load))
+        if load is None:
+            run = TorqueReferenceRun(mechanism, -(-BEFOREHAND_CYCLES // 2))
+            run.begin_identification(*_new(mechanism), profile, LegParameters.none(mechanism))
+            made.append(_finished(run, mechanism, part))
+    return tuple(made)
 
 
 def simulated_under(
     mechanism: Mechanism,
-    profiles: Sequence[CrankProfile],
+    profile: CrankProfile,
     progress: Callable[[float], None] = lambda _fraction: None,
     load: Floats | None = None,
-) -> tuple[TorqueReference, ...]:
-    """References of a new leg under given motions of its crank, as `simulated_references`.
+) -> TorqueReference:
+    """Reference of a new leg under a given motion of its crank, as `simulated_references`.
 
     Raises
     ------
     LegWearError
         If the leg cannot be simulated.
     """
-    fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
-    unworn, run = np.zeros((len(fresh), 2, SECTORS)), TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES)
     leg = LegParameters.none(mechanism)
     leg = leg if load is None else attrs.evolve(leg, load=load, load_sigma=_LOAD_SIGMA)
-    made: list[TorqueReference] = []
-    for profile in profiles:
-        run.begin(fresh, unworn, profile, leg)
-        found = run.finish(lambda part: progress((len(made) + part) / len(profiles)))
-        if found is None:
-            raise LegWearError(f"{mechanism.name}: cannot be simulated at {profile.cadence_rpm:.3g} rpm")
-        made.append(found)
-    return tuple(made)
+    run = TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES, BEFOREHAND_CYCLES)
+    run.begin(*_new(mechanism), profile, leg)
+    return _finished(run, mechanism, progress)
+
+
+def _new(mechanism: Mechanism) -> tuple[Floats, Floats]:
+    """Clearances (k,) and wear depths (k, 2, N) of a new leg [m]."""
+    fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
+    return fresh, np.zeros((len(fresh), 2, SECTORS))
+
+
+def _finished(
+    run: TorqueReferenceRun, mechanism: Mechanism, progress: Callable[[float], None]
+) -> TorqueReference:
+    """The reference that a run gives at its end."""
+    found = run.finish(progress)
+    if found is None:
+        raise LegWearError(f"{mechanism.name}: cannot be simulated at {run.profile.cadence_rpm:.3g} rpm")
+    return found
 
 
 def shipped_references(mechanism: Mechanism) -> tuple[TorqueReference, ...]:
@@ -183,6 +206,12 @@ def _reference(parts: Any, i: int, joints: int) -> TorqueReference:
     profile = CrankProfile(float(parts[f"speed_radps_{i}"]), *parts[f"ripple_rad_{i}"])
     torque_nm = np.split(parts[f"torque_nm_{i}"], np.cumsum(parts[f"cycles_{i}"])[:-1])
     found = TorqueReference(profile, parts[f"clearance_m_{i}"], tuple(torque_nm), leg)
+    if found.is_of_parameters:
+        if len(torque_nm) != len(levels_of(leg)):
+            raise ValueError(
+                f"it has {len(torque_nm)} legs with other masses. Expected {len(levels_of(leg))}"
+            )
+        return found
     others = len(torque_nm) - 1 - found.of_masses.size - found.of_frictions.size
     if others % joints:
         raise ValueError(f"its {others} wider legs are not the same number for each of {joints} joints")

@@ -8,6 +8,7 @@ joint. `LegModels` computes the models that follow from a reference and the stat
 import functools
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -209,11 +210,22 @@ def _misfit_of(own: Explainer, commissioned: signature.CommissionedTorque) -> fl
 # gait cycles alike without a reference until one is made for them; a change of the cadence has fewer
 UNLIKE_CYCLES = 20
 
-ROUNDS = 3  # most rounds of identification
+ROUNDS = 3  # most rounds of identification; later ones simulate how the parameters act near the leg so far
+_STEPS = 4  # most steps in a round; each simulates one leg, and a step that is no better ends the round
+_NEAR_CADENCE = 0.05  # fraction of the speed within which parameters act alike
 LOAD_ROUNDS = 4  # rounds of finding the ground's force: friction and impacts change with it, and it with them
 
 # a reference is renewed if a modelled clearance differs from its leg's by more than this fraction
 _FAR_FRACTION = 0.1
+
+
+class _Search(NamedTuple):
+    """A round of identification: legs that show how each parameter acts, and the best leg so far."""
+
+    varied: TorqueReference
+    best: LegParameters
+    misfit: float = math.inf
+    steps: int = 0
 
 
 class References:
@@ -256,8 +268,11 @@ class References:
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
         self._is_on_ground = is_on_ground
-        usable = (one for one in given if is_on_ground or not one.parameters.load.size)
-        self._stored = (*usable, *shipped_references(mechanism))
+        known = (*given, *shipped_references(mechanism))
+        usable = [one for one in known if is_on_ground or not one.parameters.load.size]
+        self._stored = [one for one in usable if not one.is_of_parameters]
+        self._varied = [one for one in usable if one.is_of_parameters]
+        self._search: _Search | None = None
         self.simulated: tuple[TorqueReference, ...] = ()
         self._run: TorqueReferenceRun | None = None
 
@@ -289,7 +304,7 @@ class References:
     def stop(self) -> None:
         """Forget the simulation that goes on."""
         self.leave()
-        self._run = None
+        self._run = self._search = None
 
     def leave(self) -> None:
         """Stop simulating ahead, see `ReferenceRun.leave`."""
@@ -326,7 +341,7 @@ class References:
         elif self._may_be_loaded(state):
             self._begin_under_load(state, state.reference, depth)
         elif self.is_to_identify(state):
-            self._begin_identification(state, state.reference, depth)
+            self._begin_identification(state, state.reference, modelled_m, depth)
         return False
 
     def is_to_identify(self, state: TorqueState) -> bool:
@@ -340,9 +355,7 @@ class References:
         is_known = not state.rounds and known is not None and known.in_air != none  # not its load alone
         if is_known and self._models.is_of_file(state):
             return False
-        is_unlike_file = state.rounds > 0 or known not in (None, none)
-        least = ONLY_SCATTER if is_unlike_file else WORTH_IDENTIFYING
-        return self._models.misfit(state) >= least
+        return self._models.misfit(state) >= WORTH_IDENTIFYING
 
     def is_load_left_out(self, state: TorqueState) -> bool:
         """True if the foot surely carries a load, but the configuration has the model walk without one."""
@@ -371,26 +384,51 @@ class References:
                 state.commissioned.clearance_m, depth, reference.profile, parameters
             )
 
-    def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
-        """Begin a round of identification: simulate legs with each parameter changed.
+    def _begin_identification(
+        self, state: TorqueState, reference: TorqueReference, modelled_m: Floats, depth: Floats
+    ) -> None:
+        """Begin a round of identification.
 
-        The first round may start from parameters fitted with ideal joints.
+        The first round may start from parameters fitted with ideal joints, and uses stored legs that show how
+        the parameters act, if there are any; otherwise these legs are simulated.
         """
         known = state.commissioned
         if known is None:
             return
         start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
-        state.rounds += 1
+        off = self._models.misfit(state)
+        state.rounds, state.is_identifying = state.rounds + 1, True
         clearance_m, profile, leg = known.clearance_m, reference.profile, self._mechanism
-        if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
+        is_far = is_first and not start.compliance and off >= FAR_FROM_FILE
+        if is_far:
             ideal = leg_of_ideal_torque(leg, model, known, profile.speed, start.load)
             start = attrs.evolve(ideal, load_sigma=start.load_sigma)
-        state.is_identifying = True
+        varied = self._varied_like(start, profile) if is_first else None
+        if varied is not None:
+            self._search = _Search(varied, start)
+            if is_far:
+                self._running().begin_expected(clearance_m, depth, profile, start)
+            else:
+                self._step(state, reference, model.at(clearance_m)[0], known, modelled_m, depth)
+            return
         part = self._unfinished(start, profile, clearance_m, is_of_parameters=True)
         if part is not None:
             self._running().go_on(part, depth)
         else:
             self._running().begin_identification(clearance_m, depth, profile, start)
+
+    def _varied_like(self, near: LegParameters, profile: CrankProfile) -> TorqueReference | None:
+        """Stored legs that show how the parameters of a leg in the air act at about this cadence."""
+        if near.load.size:
+            return None
+        alike = (
+            one
+            for one in self._varied
+            if abs(one.profile.speed / profile.speed - 1.0) < _NEAR_CADENCE
+            and one.parameters.compliance == near.compliance
+            and not one.parameters.load.size
+        )
+        return next(alike, None)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, modelled_m: Floats, depth: Floats
@@ -403,17 +441,17 @@ class References:
         found = run.advance()
         if found is None:
             if not run.is_busy:
-                _abandon(state)
+                self._abandon(state)
             return False
         is_here = state.reference is not None and found.profile.is_like(state.reference.profile)
         if state.is_identifying:
             state.is_identifying = False
             if is_here and state.commissioned is not None:
                 self._identify(state, found, state.commissioned, modelled_m, depth)
-            elif len(found.torque_nm) == 1:
+            elif len(found.torque_nm) == 1 and self._search is None:
                 state.load_rounds = 0
             else:
-                state.rounds -= 1
+                state.rounds, self._search = state.rounds - 1, None
             return False
         others = (one for one in self.simulated if not found.profile.is_like(one.profile))
         self.simulated = (found, *others)[:CADENCES]
@@ -463,23 +501,61 @@ class References:
         modelled_m: Floats,
         depth: Floats,
     ) -> None:
-        """Find the parameters that explain the commissioned leg, and begin a reference with them.
+        """Go on with simulated legs: with a leg under the ground's force, or near the identified parameters.
 
-        A single leg among `legs` is one under a load: then the force is found again, or is final.
+        Under a load, the force is found again, or is final.
         """
-        if len(legs.torque_nm) == 1 and state.load_rounds < LOAD_ROUNDS:
+        is_under_load = len(legs.torque_nm) == 1 and self._search is None
+        if is_under_load and state.load_rounds < LOAD_ROUNDS:
             self._begin_under_load(state, legs, depth)
-            return
-        if len(legs.torque_nm) == 1:
+        elif is_under_load:
             state.parameters = legs.parameters
+            self._begin(state.parameters, modelled_m, depth, legs.profile)
         else:
-            own = self._models.explainer(state)
-            found = identified_leg(legs, own.model, own.nuisances, known)
-            if not found.is_possible(self._mechanism):
-                _abandon(state)
+            if len(legs.torque_nm) > 1:
+                self._search = _Search(legs, legs.parameters)
+            expected = signature.mean_signatures(legs, self._models.explainer(state).model.sensor)[0]
+            self._step(state, legs, expected, known, modelled_m, depth)
+
+    def _step(
+        self,
+        state: TorqueState,
+        near: TorqueReference,
+        expected: Floats,
+        known: signature.CommissionedTorque,
+        modelled_m: Floats,
+        depth: Floats,
+    ) -> None:
+        """Step from a leg near the commissioned one, with its expected signature (F,), to a nearer one.
+
+        At the end of the round, a reference of the nearest leg begins. Another round may follow: the drive
+        dynamics of a leg with other lengths are known only then.
+        """
+        search, own = self._search, self._models.explainer(state)
+        if search is None:
+            raise RuntimeError("no identification has begun")
+        off = misfit(own.model, own.nuisances, known, expected)
+        is_better = off < search.misfit
+        if is_better:
+            search = search._replace(best=near.parameters, misfit=off)
+        if is_better and search.steps < _STEPS and (not search.steps or off >= ONLY_SCATTER):
+            found = identified_leg(near.parameters, expected, search.varied, own.model, own.nuisances, known)
+            if found.is_possible(self._mechanism):
+                self._search, state.is_identifying = search._replace(steps=search.steps + 1), True
+                self._running().begin_expected(known.clearance_m, depth, near.profile, found)
                 return
-            state.parameters = found
-        self._begin(state.parameters, modelled_m, depth, legs.profile)
+        self._search, before = None, state.reference.parameters if state.reference else None
+        state.parameters, state.is_identifying = search.best, False
+        if search.best != before:
+            self._begin(search.best, modelled_m, depth, near.profile)
+
+    def _abandon(self, state: TorqueState) -> None:
+        """Give up a simulation that failed: keep the reference, or report the failure without one."""
+        state.waiting, self._search = (), None
+        if state.reference is None:
+            state.has_failed = True
+        else:
+            state.is_identifying, state.parameters, state.rounds = False, state.reference.parameters, ROUNDS
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> bool:
         """Use a new reference at the present cadence; return whether it is used.
@@ -513,12 +589,3 @@ def _is_far(reference: TorqueReference, modelled_m: Floats) -> bool:
     """True if the expected leg of a reference has other clearances than the modelled ones (k,) [m]."""
     expected_m = np.maximum(modelled_m, LEAST_CLEARANCE_M)  # no leg is simulated with less
     return bool((np.abs(reference.clearance_m[0] / expected_m - 1.0) > _FAR_FRACTION).any())
-
-
-def _abandon(state: TorqueState) -> None:
-    """Give up a simulation that failed: keep the present reference, or report the failure without one."""
-    state.waiting = ()
-    if state.reference is None:
-        state.has_failed = True
-    else:
-        state.is_identifying, state.parameters, state.rounds = False, state.reference.parameters, ROUNDS

@@ -365,10 +365,8 @@ class DigitalTwin:
             elif reason != run.DONE:
                 joint = self.clearance_joints[k] if k >= 0 else None
                 events.append(Event(int(self._state.motion.failed_at_ns), _FAILURES[reason], joint))
-        stamp, kind, angle, torque, measured = (
-            evaluated[name][:m] for name in following.EVALUATED.names or ()
-        )
-        return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured)
+        stamp, kind, angle, torque = (evaluated[name][:m] for name in following.EVALUATED.names or ())
+        return SampleStatistics(stamp, kind, angle, torque, forces[:m])
 
     def _room(self, n: int) -> tuple[Records, Floats]:
         """Room for n samples: `EVALUATED`, and contact forces (n, k) [N]."""

@@ -169,7 +169,6 @@ EVALUATED = np.dtype(
         ("angle", "f8"),  # crank angle [rad], NaN while the leg does not run
         # mean drive torque since the previous sample, with the drive's friction [N m]; NaN while at rest
         ("torque", "f8"),
-        ("measured", "f8"),  # drive torque of the sample [N m], NaN without one
     ]
 )
 """The leg at a sample."""
@@ -567,7 +566,6 @@ def follow(
         elif code == EVALUATE:
             out = evaluated[m]
             out.stamp_ns, out.kind, out.angle, out.torque = step.end_ns, step.detail, math.nan, math.nan
-            out.measured = step.torque
             if motion.runs != 0:
                 _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
             for j in range(force.shape[0]):

@@ -62,8 +62,6 @@ class SampleStatistics:
         Mean of the predicted drive torque since the previous sample, with the friction of the drive.
     contact_force_n : (n, k) array
         Forces in the clearance joints at the sample.
-    measured_torque_nm : (n,) array
-        Drive torque of the sample, also while tracking is lost; NaN without one.
     """
 
     stamp_ns: Ints
@@ -71,7 +69,6 @@ class SampleStatistics:
     crank_angle_rad: Floats
     predicted_torque_nm: Floats
     contact_force_n: Floats
-    measured_torque_nm: Floats
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
@@ -333,7 +330,7 @@ def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleSt
         return parts[0]
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     none, forces = np.zeros(0), np.zeros((0, clearance_joints))
-    empty = SampleStatistics(stamps, stamps, none, none, forces, none)
+    empty = SampleStatistics(stamps, stamps, none, none, forces)
     names = [field.name for field in attrs.fields(SampleStatistics)]
     return SampleStatistics(
         *(np.concatenate([getattr(part, name) for part in parts or (empty,)]) for name in names)

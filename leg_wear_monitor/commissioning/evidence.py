@@ -20,7 +20,7 @@ _ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which a ca
 
 
 def late_s(torque: Series, base: MonitorConfig) -> float:
-    """Time [s] by which a torque is late: by its sampling, and by its drive's declared lag and low-pass."""
+    """Delay of a torque [s]: of its sampling, and of the declared lag and low-pass of its drive."""
     sampled_s = 0.5 * _interval_s(torque.time_s) if base.drive_torque.sampling == AVERAGE else 0.0
     return sampled_s + drive_figures(base.drive).lateness_s
 

@@ -184,7 +184,7 @@ def paired(motion: JointMotion, torque: Series, late_s: float = 0.0) -> Pair:
     A torque that is late by a time [s] belongs to the motion before.
     """
     time_s, times = motion.time_s, torque.time_s - late_s
-    # torque samples during the motion, and those of them outside its gaps
+    # Keep the torque samples that lie within the motion and outside its gaps.
     inside = (times >= time_s[0]) & (times <= time_s[-1])
     inside[inside] = np.interp(times[inside], time_s, motion.near.astype(float)) > 0.5
     at, values = times[inside], (motion.position_rad, motion.speed_radps, motion.acceleration_radps2)

@@ -14,8 +14,9 @@ from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
 
 # Units of the files of materials and drives: the measured quantity, and the factor to SI.
 #
-# Makers give a wear rate in µm/km at a pressure, so the unit names 1 MPa. A dimensionless K of Archard's law
-# is no unit: books write V = K F s / H and V = K F s / (3 H), so a file has K / H or K / (3 H).
+# Makers give a wear rate in µm/km at a pressure, so the unit names 1 MPa. The K of Archard's law is
+# dimensionless, and books define it by V = K F s / H or by V = K F s / (3 H). A file therefore has K / H or
+# K / (3 H).
 
 
 _MM3, _INCH, _POUND = 1.0e-9, 0.0254, 4.4482216152605  # m^3, m, N

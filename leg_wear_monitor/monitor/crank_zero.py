@@ -43,9 +43,8 @@ from leg_wear_monitor.twin.sample import (
 # turns after which a zero is looked for: two are enough for averages, and the third shows the repeating
 # residual; instants need up to twelve (docs/appendix/commissioning.md). Then the search begins again
 TURNS = (3, 6, 12)
-_LONGEST = (
-    1.5  # time of a search over the time of the commanded turns: slower walks are not the commanded one
-)
+# Time of a search, as a multiple of the commanded turns' time. A slower walk is not at the commanded cadence.
+_LONGEST = 1.5
 _MOST_SAMPLES = 400_000  # 30 MB, for torques without a crank
 _SURE_RAD = 0.015  # scatter that a found zero may have: less than the phase error by clearances
 _LEAST_SAMPLES = 25  # torque samples in a turn: two and a half in a period of the tenth harmonic
@@ -98,7 +97,7 @@ class CrankZero(Observer):
         self.times_found = 0
         self._begin()
         self._last_ns, self._last_rad = 0, 0.0  # the last crank sample; stamp 0 before the first
-        # stamp since which there is no zero; time before the first zero, which the twin does not count
+        # The zero is unknown from this stamp on. The twin does not count the time before the first zero.
         self._lost_ns, self._before_s = 0, 0.0
 
     def _begin(self, why: str = "") -> None:
@@ -107,7 +106,7 @@ class CrankZero(Observer):
         self._samples: list[Samples] = [np.zeros(0, GAIT_SAMPLE)]
 
     def passed(self, samples: Samples, ends_period: bool) -> Samples:
-        """Samples to track, with the zero; none while there is no zero."""
+        """Samples to track, shifted by the zero; empty while the zero is unknown."""
         out = []
         for i, part in enumerate(np.split(samples, self._breaks(samples))):
             if i and self.zero is not None:

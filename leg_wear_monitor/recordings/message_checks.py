@@ -91,7 +91,7 @@ _LEAST = 40
 _SWINGS = 0.3  # RMS of a drive's torque, as a fraction of the predicted one
 _STILL = 0.02  # Largest RMS of noise and crosstalk between a sensor's axes, as a fraction
 _WITH_CRANK = (NO_FAULT, NOT_FINITE, ZERO_STAMP)  # faults of messages that have the crank
-_NAMED = 5  # messages without the crank of which the names are read
+_NAMED = 5  # messages without the crank whose joint names are read, per block
 
 
 class MessageChecks:

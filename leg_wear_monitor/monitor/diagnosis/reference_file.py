@@ -40,7 +40,7 @@ def simulated_references(
 ) -> tuple[TorqueReference, ...]:
     """References of a new leg whose crank turns steadily, as many cores as there are at once.
 
-    In the air, each is followed by the legs that show how masses, lengths and friction act.
+    For a leg in the air, legs that show the effect of masses, lengths and friction follow each reference.
 
     Parameters
     ----------

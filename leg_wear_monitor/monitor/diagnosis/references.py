@@ -211,7 +211,7 @@ def _misfit_of(own: Explainer, commissioned: signature.CommissionedTorque) -> fl
 UNLIKE_CYCLES = 20
 
 ROUNDS = 3  # most rounds of identification; later ones simulate how the parameters act near the leg so far
-_STEPS = 4  # most steps in a round; each simulates one leg, and a step that is no better ends the round
+_STEPS = 4  # most steps in a round: each simulates one leg, and a step without improvement ends the round
 _NEAR_CADENCE = 0.05  # fraction of the speed within which parameters act alike
 LOAD_ROUNDS = 4  # rounds of finding the ground's force: friction and impacts change with it, and it with them
 
